@@ -1,0 +1,2 @@
+//! Closest points and times of impact.
+pub(crate) struct Collider;

@@ -1,0 +1,83 @@
+//! Handles: 8-byte names of things in a [`World`](crate::World). Outside the engine only handles are seen, inside only `u32`.
+
+use core::marker::PhantomData;
+
+/// Names one `T` of a world. Stays valid while the thing lives; a later thing in the same slot has another generation.
+pub struct Handle<T> {
+    pub(crate) index: u32,
+    pub(crate) generation: u32,
+    kind: PhantomData<fn() -> T>,
+}
+
+impl<T> Handle<T> {
+    pub(crate) fn new(index: u32, generation: u32) -> Self {
+        Handle { index, generation, kind: PhantomData }
+    }
+    /// Slot of the thing, for use as a dense key. Unique among the living things of its kind.
+    pub fn index(self) -> usize {
+        self.index as usize
+    }
+}
+
+impl<T> Clone for Handle<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T> Copy for Handle<T> {}
+impl<T> PartialEq for Handle<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.index == other.index && self.generation == other.generation
+    }
+}
+impl<T> Eq for Handle<T> {}
+impl<T> core::fmt::Debug for Handle<T> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "#{}.{}", self.index, self.generation)
+    }
+}
+
+/// Slots with generations. Iteration is in slot order, so it is reproducible.
+#[derive(Debug, Clone)]
+pub(crate) struct Slots<T> {
+    slots: Vec<(u32, Option<T>)>,
+}
+
+impl<T> Default for Slots<T> {
+    fn default() -> Self {
+        Slots { slots: Vec::new() }
+    }
+}
+
+impl<T> Slots<T> {
+    pub(crate) fn insert<K>(&mut self, value: T) -> Handle<K> {
+        if let Some(i) = self.slots.iter().position(|(_, v)| v.is_none()) {
+            self.slots[i].0 += 1;
+            self.slots[i].1 = Some(value);
+            return Handle::new(i as u32, self.slots[i].0);
+        }
+        self.slots.push((0, Some(value)));
+        Handle::new(self.slots.len() as u32 - 1, 0)
+    }
+    pub(crate) fn get<K>(&self, h: Handle<K>) -> Option<&T> {
+        self.slots.get(h.index as usize).filter(|(g, _)| *g == h.generation).and_then(|(_, v)| v.as_ref())
+    }
+    pub(crate) fn get_mut<K>(&mut self, h: Handle<K>) -> Option<&mut T> {
+        self.slots.get_mut(h.index as usize).filter(|(g, _)| *g == h.generation).and_then(|(_, v)| v.as_mut())
+    }
+    pub(crate) fn remove<K>(&mut self, h: Handle<K>) -> Option<T> {
+        self.slots.get_mut(h.index as usize).filter(|(g, _)| *g == h.generation).and_then(|(_, v)| v.take())
+    }
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, &T)> {
+        self.slots.iter().enumerate().filter_map(|(i, (_, v))| v.as_ref().map(|v| (i as u32, v)))
+    }
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (u32, &mut T)> {
+        self.slots.iter_mut().enumerate().filter_map(|(i, (_, v))| v.as_mut().map(|v| (i as u32, v)))
+    }
+    pub(crate) fn at(&self, index: u32) -> Option<&T> {
+        self.slots.get(index as usize).and_then(|(_, v)| v.as_ref())
+    }
+    pub(crate) fn handle<K>(&self, index: u32) -> Handle<K> {
+        Handle::new(index, self.slots[index as usize].0)
+    }
+}

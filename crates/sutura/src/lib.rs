@@ -1,0 +1,29 @@
+//! Real-time simulator of surgical thread: inextensible Cosserat rods of true physical size that touch, hold by friction and knot.
+//!
+//! SI units throughout; right-handed; no up axis (gravity is a vector). Energy, tension and twist signs: tension is positive when
+//! stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
+
+mod collide;
+pub mod error;
+pub mod handle;
+pub mod math;
+mod model;
+mod params;
+mod report;
+mod rod;
+mod state;
+mod view;
+mod world;
+
+pub use error::Error;
+pub use glam;
+pub use handle::Handle;
+pub use math::Pose;
+pub use model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
+pub use model::material::{Material, Plasticity, Section, Shear};
+pub use model::rod::{RestShape, Rod, RodSpec, Stretch, transported_frames};
+pub use model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
+pub use params::{Friction, Settings};
+pub use report::{Incident, IncidentKind, StepReport};
+pub use view::{ContactView, ContactWith, Energy, RodView, ShapeView, View};
+pub use world::{World, Wrench};

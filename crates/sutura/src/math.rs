@@ -1,0 +1,156 @@
+//! Rotations and small linear algebra, each convention in one place.
+//!
+//! `log(q)` is the rotation vector (axis times angle, angle in [0, pi]); `exp` is its inverse. A rotation is updated in world
+//! axes, `q <- exp(phi) q`. Transcendental functions come from `libm`, so that the bits agree across machines.
+
+use glam::{DMat3, DQuat, DVec3};
+
+/// A rigid placement: takes points of a body to the world, `x_world = orientation * x_body + position`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Origin of the body in the world \[m\].
+    pub position: DVec3,
+    /// `world_from_body`, a unit quaternion.
+    pub orientation: DQuat,
+}
+
+impl Pose {
+    /// The body frame is the world frame.
+    pub const IDENTITY: Pose = Pose { position: DVec3::ZERO, orientation: DQuat::IDENTITY };
+
+    /// A placement from its two parts.
+    pub fn new(position: DVec3, orientation: DQuat) -> Self {
+        Pose { position, orientation }
+    }
+    /// A placement that only moves.
+    pub fn at(position: DVec3) -> Self {
+        Pose { position, orientation: DQuat::IDENTITY }
+    }
+    /// World coordinates of a body point.
+    pub fn transform_point(&self, p: DVec3) -> DVec3 {
+        self.orientation * p + self.position
+    }
+    /// Body coordinates of a world point.
+    pub fn inverse_transform_point(&self, p: DVec3) -> DVec3 {
+        self.orientation.conjugate() * (p - self.position)
+    }
+    /// `self * inner`: the placement of something known in this body's frame.
+    pub fn compose(&self, inner: &Pose) -> Pose {
+        Pose { position: self.transform_point(inner.position), orientation: (self.orientation * inner.orientation).normalize() }
+    }
+    /// The placement that undoes this one.
+    pub fn inverse(&self) -> Pose {
+        let inv = self.orientation.conjugate();
+        Pose { position: -(inv * self.position), orientation: inv }
+    }
+    /// Between two placements: straight line and shortest constant-rate rotation, `s` in \[0, 1\].
+    pub fn interpolate(&self, to: &Pose, s: f64) -> Pose {
+        let turn = log(to.orientation * self.orientation.conjugate());
+        Pose { position: self.position + (to.position - self.position) * s, orientation: (exp(turn * s) * self.orientation).normalize() }
+    }
+    /// Whether every number is finite and the quaternion is a unit one.
+    pub(crate) fn is_valid(&self) -> bool {
+        self.position.is_finite() && self.orientation.is_finite() && (self.orientation.length() - 1.0).abs() < 1e-6
+    }
+}
+
+/// Unit quaternion of the rotation vector `phi` \[rad\].
+#[inline]
+pub fn exp(phi: DVec3) -> DQuat {
+    let a2 = phi.length_squared();
+    // Below 1e-3 rad^2 the series to a^6 is exact to the last bit; it also avoids 0/0.
+    let (s, c) = if a2 < 1e-3 {
+        let s = 0.5 - a2 * (1.0 / 48.0 - a2 * (1.0 / 3840.0 - a2 / 645_120.0));
+        let c = 1.0 - a2 * (0.125 - a2 * (1.0 / 384.0 - a2 * (1.0 / 46_080.0 - a2 / 10_321_920.0)));
+        (s, c)
+    } else {
+        let a = a2.sqrt();
+        let (sin, cos) = libm::sincos(0.5 * a);
+        (sin / a, cos)
+    };
+    DQuat::from_xyzw(phi.x * s, phi.y * s, phi.z * s, c)
+}
+
+/// Rotation vector of the unit quaternion `q` \[rad\], of length at most pi.
+#[inline]
+pub fn log(q: DQuat) -> DVec3 {
+    let v = DVec3::new(q.x, q.y, q.z);
+    let s2 = v.length_squared();
+    let w = q.w.abs();
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    // 2 atan(s/w)/s as a series in (s/w)^2 while that is small.
+    let k = if s2 < 1e-3 * w * w {
+        let u = s2 / (w * w);
+        2.0 / w * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * (1.0 / 7.0 - u * (1.0 / 9.0 - u / 11.0)))))
+    } else {
+        let s = s2.sqrt();
+        2.0 * libm::atan2(s, w) / s
+    };
+    v * (k * sign)
+}
+
+/// Matrix of the cross product: `skew(a) * b = a x b`.
+#[inline]
+pub fn skew(a: DVec3) -> DMat3 {
+    DMat3::from_cols(DVec3::new(0.0, a.z, -a.y), DVec3::new(-a.z, 0.0, a.x), DVec3::new(a.y, -a.x, 0.0))
+}
+
+/// `a b^T`.
+#[inline]
+pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// The rotation of least angle that takes unit vector `a` to unit vector `b`; for opposite vectors half a turn about an axis across `a`.
+pub fn rotation_arc(a: DVec3, b: DVec3) -> DQuat {
+    let w = 1.0 + a.dot(b);
+    if w < 1e-12 {
+        let axis = a.any_orthonormal_vector();
+        return DQuat::from_xyzw(axis.x, axis.y, axis.z, 0.0);
+    }
+    let v = a.cross(b);
+    DQuat::from_xyzw(v.x, v.y, v.z, w).normalize()
+}
+
+/// A unit quaternion whose third director is the unit vector `t`; the first is the one nearest to `hint`, or any across `t`.
+pub fn frame_from_tangent(t: DVec3, hint: DVec3) -> DQuat {
+    let across = hint - t * t.dot(hint);
+    let d1 =
+        if across.length_squared() > 1e-12 * hint.length_squared() && hint.length_squared() > 0.0 { across.normalize() } else { t.any_orthonormal_vector() };
+    DQuat::from_mat3(&DMat3::from_cols(d1, t.cross(d1), t)).normalize()
+}
+
+/// Square root of a rotation: half its angle about the same axis.
+#[inline]
+pub fn half(q: DQuat) -> DQuat {
+    exp(log(q) * 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exp_and_log_are_inverse_across_the_series_switch() {
+        for a in [0.0, 1e-9, 1e-3, 0.03, 0.0316, 0.0317, 0.05, 0.5, 1.5, 3.0, 3.1415] {
+            let phi = DVec3::new(0.36, -0.48, 0.8) * a;
+            let q = exp(phi);
+            assert!((q.length() - 1.0).abs() < 4e-16, "unit at {a}");
+            assert!((log(q) - phi).length() <= 4e-15 * a.max(1e-3), "log at {a}: {}", (log(q) - phi).length());
+        }
+    }
+
+    #[test]
+    fn interpolation_turns_at_constant_rate() {
+        let to = Pose::new(DVec3::new(1.0, 2.0, 3.0), exp(DVec3::new(0.0, 0.0, 2.0)));
+        let p = Pose::IDENTITY.interpolate(&to, 0.25);
+        assert!((p.position - to.position * 0.25).length() < 1e-15);
+        assert!((log(p.orientation) - DVec3::new(0.0, 0.0, 0.5)).length() < 1e-14);
+    }
+
+    #[test]
+    fn arc_of_opposite_vectors_is_half_a_turn() {
+        let q = rotation_arc(DVec3::X, -DVec3::X);
+        assert!((q * DVec3::X + DVec3::X).length() < 1e-15);
+    }
+}

@@ -1,0 +1,153 @@
+//! What holds or drives a piece of a thread, and what loads it.
+
+use crate::error::{Error, check};
+use crate::handle::Handle;
+use crate::model::rod::Rod;
+use glam::DVec3;
+
+/// A grip. Marker of [`Handle`](crate::Handle).
+#[derive(Debug)]
+pub enum Grip {}
+
+/// A load. Marker of [`Handle`](crate::Handle).
+#[derive(Debug)]
+pub enum Load {}
+
+/// A place along a thread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// The first particle (for [`Hold::Jaw`] the first element).
+    Start,
+    /// The last particle (for [`Hold::Jaw`] the last element).
+    End,
+    /// Particle by number, from 0 at the start.
+    Particle(u32),
+    /// Middle of an element by number, from 0 at the start.
+    Element(u32),
+    /// The particle (for [`Hold::Jaw`] and loads the element) nearest to this rest arc length from the start \[m\].
+    Arc(f64),
+}
+
+/// How a grip holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// The position of one particle; it may turn.
+    Pin,
+    /// One particle and the cross-section there. It acts over half an element on each side (compliance of half a joint), which
+    /// keeps the solution second order in the element length.
+    Clamp,
+    /// A whole element: its two particles and its frame, as between the jaws of an instrument.
+    Jaw,
+}
+
+/// What moves a grip.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Drive {
+    /// A pose set by the user ([`World::set_grip_pose`](crate::World::set_grip_pose)); where it is when taken, until then.
+    Pose,
+    /// A force along a line through where it is, with a speed limit: the grip acts with `force * (1 - speed / speed_limit)` along
+    /// `direction`, so it moves at `speed_limit` where nothing resists and rests where the thread pulls back with `force`.
+    /// It does not move across `direction`; a clamp or jaw does not turn.
+    Force {
+        /// Direction of the force in the world, a unit vector.
+        direction: DVec3,
+        /// Force wanted \[N\], >= 0.
+        force: f64,
+        /// Speed where nothing resists \[m/s\], > 0.
+        speed_limit: f64,
+    },
+}
+
+/// A grip to take.
+#[derive(Debug, Clone)]
+pub struct GripSpec {
+    /// The thread.
+    pub rod: Handle<Rod>,
+    /// Where along it.
+    pub place: Place,
+    /// How it holds.
+    pub hold: Hold,
+    /// What moves it.
+    pub drive: Drive,
+    /// Time over which it takes hold \[s\], >= 0: the held piece passes smoothly from its own motion to the grip's. Where the first
+    /// pose set differs from the piece's pose, the difference is closed over this time too.
+    pub ramp: f64,
+}
+
+impl GripSpec {
+    /// A grip driven by pose that takes hold over 20 ms.
+    pub fn new(rod: Handle<Rod>, place: Place, hold: Hold) -> Self {
+        GripSpec { rod, place, hold, drive: Drive::Pose, ramp: 0.02 }
+    }
+    /// The same, holding from this instant.
+    pub fn at_once(rod: Handle<Rod>, place: Place, hold: Hold) -> Self {
+        GripSpec { ramp: 0.0, ..Self::new(rod, place, hold) }
+    }
+}
+
+impl Drive {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        if let Drive::Force { direction, force, speed_limit } = self {
+            check("grip", "drive.force", *force, *force >= 0.0, "a finite force >= 0 [N]")?;
+            check("grip", "drive.speed_limit", *speed_limit, *speed_limit > 0.0, "a finite speed > 0 [m/s]")?;
+            if !direction.is_finite() || (direction.length() - 1.0).abs() > 1e-6 {
+                return Err(Error::invalid("grip", "drive.direction", direction, "a unit vector"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What acts on a thread from outside, beside gravity.
+#[derive(Debug, Clone)]
+pub struct LoadSpec {
+    /// The thread.
+    pub rod: Handle<Rod>,
+    /// The load.
+    pub kind: LoadKind,
+}
+
+/// Kinds of load. Forces and torques are in world axes and keep their direction (dead loads).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LoadKind {
+    /// Force \[N\] and torque \[N m\] at a place. A torque acts on the nearest element.
+    Point {
+        /// Where.
+        place: Place,
+        /// Force \[N\].
+        force: DVec3,
+        /// Torque \[N m\].
+        torque: DVec3,
+    },
+    /// Force per rest length along the whole thread \[N/m\].
+    Uniform {
+        /// Force per length \[N/m\].
+        force_per_length: DVec3,
+    },
+    /// A mass and its moments of inertia fixed to the thread at a place. It has weight.
+    Mass {
+        /// Where.
+        place: Place,
+        /// Mass \[kg\], >= 0.
+        mass: f64,
+        /// Moments of inertia along d1, d2, d3 of the nearest element \[kg m^2\], >= 0.
+        inertia: DVec3,
+    },
+}
+
+impl LoadKind {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let finite = |field: &str, v: DVec3| if v.is_finite() { Ok(()) } else { Err(Error::invalid("load", field, v, "a finite vector")) };
+        match self {
+            LoadKind::Point { force, torque, .. } => {
+                finite("force", *force)?;
+                finite("torque", *torque)
+            }
+            LoadKind::Uniform { force_per_length } => finite("force_per_length", *force_per_length),
+            LoadKind::Mass { mass, inertia, .. } => {
+                check("load", "mass", *mass, *mass >= 0.0, "a finite mass >= 0 [kg]")?;
+                check("load", "inertia", inertia.min_element(), inertia.is_finite() && inertia.min_element() >= 0.0, "finite moments >= 0 [kg m^2]")
+            }
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! What a user says of a thread, and the checked, lowered form that the solver reads.
+
+use crate::error::{Error, check};
+use crate::math::{frame_from_tangent, rotation_arc};
+use crate::model::material::{Material, Section};
+use glam::{DQuat, DVec3};
+
+/// A thread. Marker of [`Handle`](crate::Handle).
+#[derive(Debug)]
+pub enum Rod {}
+
+/// A thread to insert.
+#[derive(Debug, Clone)]
+pub struct RodSpec {
+    /// Particles along the centerline in the world \[m\], at least two, no two neighbors at one place.
+    pub centerline: Vec<DVec3>,
+    /// Material frame of each element, `world_from_material`, third director along the element. `None`: transported without
+    /// twist from the first, whose first director is the across direction nearest to the normal of the first bend.
+    pub frames: Option<Vec<DQuat>>,
+    /// Shape that the thread has when nothing acts on it.
+    pub rest: RestShape,
+    /// Radius \[m\], > 0.
+    pub radius: f64,
+    /// What it is made of.
+    pub material: Material,
+    /// Whether the centerline may stretch.
+    pub stretch: Stretch,
+    /// Surface for friction, an index of the user's choice (see [`World::set_friction`](crate::World::set_friction)).
+    pub surface: u32,
+}
+
+/// Shape of a thread at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RestShape {
+    /// As inserted: lengths, bend and twist of `centerline` and `frames` are free of force.
+    AsInserted,
+    /// Straight and untwisted, with the lengths of `centerline`.
+    Straight,
+    /// Lengths of the elements \[m\] and rest bend and twist of the joints, along d1, d2, d3 \[1/m\]; either may be left to `centerline`.
+    Given {
+        /// Rest length of each element \[m\], > 0; `None` takes them from `centerline`.
+        lengths: Option<Vec<f64>>,
+        /// Rest Darboux vector of each joint between neighboring elements \[rad/m\]; `None` is straight and untwisted.
+        darboux: Option<Vec<DVec3>>,
+    },
+}
+
+/// Whether the centerline stretches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stretch {
+    /// By T / (E A).
+    Elastic,
+    /// Not at all: lengths are constraints, held to the solver's tolerance.
+    Inextensible,
+}
+
+impl RodSpec {
+    /// An elastic, straight-rest thread through `centerline`.
+    pub fn new(centerline: Vec<DVec3>, radius: f64, material: Material) -> Self {
+        RodSpec { centerline, frames: None, rest: RestShape::Straight, radius, material, stretch: Stretch::Elastic, surface: 0 }
+    }
+
+    /// `n_elements` equal elements from `from` to `to`.
+    pub fn straight(from: DVec3, to: DVec3, n_elements: usize, radius: f64, material: Material) -> Self {
+        let n = n_elements.max(1);
+        let points = (0..=n).map(|i| from.lerp(to, i as f64 / n as f64)).collect();
+        Self::new(points, radius, material)
+    }
+
+    /// Equal elements on a helix about the axis `axis` (unit) through `center`, starting at `center + start` (`start` across the
+    /// axis, its length is the helix radius), `turns` turns (positive is right-handed), advancing `pitch` \[m\] a turn. The rest
+    /// shape is the helix itself.
+    pub fn helix(center: DVec3, axis: DVec3, start: DVec3, turns: f64, pitch: f64, n_elements: usize, radius: f64, material: Material) -> Self {
+        let other = axis.cross(start);
+        let n = n_elements.max(1);
+        let points = (0..=n)
+            .map(|i| {
+                let turn = turns.abs() * i as f64 / n as f64;
+                let (s, c) = libm::sincos(core::f64::consts::TAU * turn * turns.signum());
+                center + start * c + other * s + axis * (pitch * turn)
+            })
+            .collect();
+        RodSpec { rest: RestShape::AsInserted, ..Self::new(points, radius, material) }
+    }
+}
+
+/// Frames along `points` without twist, starting with the across direction nearest to `hint`.
+pub fn transported_frames(points: &[DVec3], hint: DVec3) -> Vec<DQuat> {
+    let mut frames = Vec::with_capacity(points.len().saturating_sub(1));
+    let mut before: Option<(DVec3, DQuat)> = None;
+    for pair in points.windows(2) {
+        let t = (pair[1] - pair[0]).normalize();
+        let q = match before {
+            None => frame_from_tangent(t, hint),
+            Some((t0, q0)) => (rotation_arc(t0, t) * q0).normalize(),
+        };
+        frames.push(q);
+        before = Some((t, q));
+    }
+    frames
+}
+
+/// A rod as the solver reads it. Elements and joints are slices of the world's arrays.
+#[derive(Debug, Clone)]
+pub(crate) struct RodModel {
+    /// Index of the first particle in the world's particle arrays.
+    pub first_particle: u32,
+    /// Index of the first frame (element) in the world's frame arrays.
+    pub first_frame: u32,
+    pub n_elements: u32,
+    pub radius: f64,
+    pub section: Section,
+    pub material: Material,
+    pub stretch: Stretch,
+    pub surface: u32,
+    /// Radius-scaled normal stiffness of its surface \[N/m\].
+    pub contact_stiffness: f64,
+}
+
+impl RodModel {
+    pub fn particles(&self) -> core::ops::Range<usize> {
+        self.first_particle as usize..(self.first_particle + self.n_elements + 1) as usize
+    }
+    pub fn frames(&self) -> core::ops::Range<usize> {
+        self.first_frame as usize..(self.first_frame + self.n_elements) as usize
+    }
+}
+
+/// The parts of a rod that go into the world's arrays, checked.
+pub(crate) struct Lowered {
+    pub rest_lengths: Vec<f64>,
+    /// Square root of the rest rotation of each joint; entry j is between frames j-1 and j (entry 0 unused, identity).
+    pub rest_half: Vec<DQuat>,
+    pub frames: Vec<DQuat>,
+}
+
+impl RodSpec {
+    pub(crate) fn lower(&self) -> Result<Lowered, Error> {
+        let what = "rod";
+        self.material.validate()?;
+        check(what, "radius", self.radius, self.radius > 0.0, "a finite length > 0 [m]")?;
+        let points = &self.centerline;
+        if points.len() < 2 {
+            return Err(Error::invalid(what, "centerline", format!("{} points", points.len()), "at least 2 points"));
+        }
+        for (i, p) in points.iter().enumerate() {
+            if !p.is_finite() {
+                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates [m]"));
+            }
+        }
+        let n = points.len() - 1;
+        // A segment shorter than a thousandth of the radius has no usable direction.
+        let shortest = 1e-3 * self.radius;
+        for i in 0..n {
+            let l = (points[i + 1] - points[i]).length();
+            if l <= shortest {
+                return Err(Error::invalid(what, format!("centerline[{i}..{}]", i + 1), l, "neighboring points farther apart than radius / 1000"));
+            }
+        }
+        let frames = match &self.frames {
+            Some(f) => {
+                if f.len() != n {
+                    return Err(Error::invalid(what, "frames", format!("{} frames", f.len()), "one for each element"));
+                }
+                for (i, q) in f.iter().enumerate() {
+                    let t = (points[i + 1] - points[i]).normalize();
+                    if !q.is_finite() || (q.length() - 1.0).abs() > 1e-6 || (*q * DVec3::Z).dot(t) < 0.9 {
+                        return Err(Error::invalid(what, format!("frames[{i}]"), q, "a unit quaternion whose third director is along the element"));
+                    }
+                }
+                f.iter().map(|q| q.normalize()).collect()
+            }
+            None => {
+                let bend = points.windows(3).map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize())).find(|c| c.length() > 1e-6);
+                transported_frames(points, bend.unwrap_or(DVec3::ZERO))
+            }
+        };
+        let own_lengths = || (0..n).map(|i| (points[i + 1] - points[i]).length()).collect::<Vec<_>>();
+        let mut rest_half = vec![DQuat::IDENTITY; n];
+        let rest_lengths = match &self.rest {
+            RestShape::Straight => own_lengths(),
+            RestShape::AsInserted => {
+                for j in 1..n {
+                    rest_half[j] = crate::math::half(frames[j - 1].conjugate() * frames[j]);
+                }
+                own_lengths()
+            }
+            RestShape::Given { lengths, darboux } => {
+                let lengths = match lengths {
+                    Some(l) if l.len() != n => return Err(Error::invalid(what, "rest.lengths", format!("{} lengths", l.len()), "one for each element")),
+                    Some(l) => {
+                        if let Some(i) = l.iter().position(|l| !(l.is_finite() && *l > shortest)) {
+                            return Err(Error::invalid(what, format!("rest.lengths[{i}]"), l[i], "a finite length > radius / 1000 [m]"));
+                        }
+                        l.clone()
+                    }
+                    None => own_lengths(),
+                };
+                if let Some(d) = darboux {
+                    if d.len() + 1 != n {
+                        return Err(Error::invalid(what, "rest.darboux", format!("{} joints", d.len()), "one for each joint between neighboring elements"));
+                    }
+                    for j in 1..n {
+                        let phi = d[j - 1] * (0.5 * (lengths[j - 1] + lengths[j]));
+                        if !(phi.is_finite() && phi.length() < 3.0) {
+                            return Err(Error::invalid(what, format!("rest.darboux[{}]", j - 1), d[j - 1], "finite, under 3 rad per element"));
+                        }
+                        rest_half[j] = crate::math::exp(phi * 0.5);
+                    }
+                }
+                lengths
+            }
+        };
+        Ok(Lowered { rest_lengths, rest_half, frames })
+    }
+}

@@ -1,0 +1,78 @@
+//! Settings of a world and every tolerance of the step. Lengths that the solver compares with are multiples of the smallest
+//! thread radius; nothing here is an absolute length.
+
+use crate::error::{Error, check};
+use glam::DVec3;
+
+/// Settings of a world. All have defaults; every one may be changed between steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Gravity \[m/s^2\]. Default (0, 0, -9.81).
+    pub gravity: DVec3,
+    /// Longest substep \[s\], > 0. A step is cut into equal substeps no longer than this. Default 1/240.
+    pub substep: f64,
+    /// Newton iterations in a substep before it is given up and halved, >= 1. Default 12.
+    pub newton_max: u32,
+    /// A substep has converged when the last Newton iteration turned no element by more than this \[rad\] (and moved no
+    /// particle by more than ten times as many radii). The error left is of the order of its square. Default 0.003.
+    pub tolerance: f64,
+    /// Linear damping d_v in [0, 1): velocities lose this fraction in a second, whatever the step. Default 0.
+    pub linear_damping: f64,
+    /// Angular damping d_a in [0, 1), per second. Default 0.
+    pub angular_damping: f64,
+    /// Friction where no pair of surfaces is set. Default 0.3 and 0.3.
+    pub friction: Friction,
+    /// How many times a substep may be halved, 0..=12. Default 8.
+    pub halvings: u32,
+}
+
+/// Coulomb friction between two surfaces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    /// Coefficient while the contact sticks, >= 0.
+    pub stick: f64,
+    /// Coefficient while it slides, 0 <= slide <= stick.
+    pub slide: f64,
+}
+
+impl Friction {
+    /// The same coefficient sticking and sliding.
+    pub fn coulomb(mu: f64) -> Self {
+        Friction { stick: mu, slide: mu }
+    }
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        check("friction", "stick", self.stick, self.stick >= 0.0, "a finite number >= 0")?;
+        check("friction", "slide", self.slide, self.slide >= 0.0 && self.slide <= self.stick, "a number in [0, stick]")
+    }
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            gravity: DVec3::new(0.0, 0.0, -9.81),
+            substep: 1.0 / 240.0,
+            newton_max: 12,
+            tolerance: 3e-3,
+            linear_damping: 0.0,
+            angular_damping: 0.0,
+            friction: Friction::coulomb(0.3),
+            halvings: 8,
+        }
+    }
+}
+
+impl Settings {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        let what = "settings";
+        if !self.gravity.is_finite() {
+            return Err(Error::invalid(what, "gravity", self.gravity, "a finite vector [m/s^2]"));
+        }
+        check(what, "substep", self.substep, self.substep > 0.0, "a finite time > 0 [s]")?;
+        check(what, "newton_max", f64::from(self.newton_max), self.newton_max >= 1, "at least 1")?;
+        check(what, "tolerance", self.tolerance, self.tolerance > 0.0 && self.tolerance <= 0.1, "a number in (0, 0.1]")?;
+        check(what, "linear_damping", self.linear_damping, (0.0..1.0).contains(&self.linear_damping), "a number in [0, 1)")?;
+        check(what, "angular_damping", self.angular_damping, (0.0..1.0).contains(&self.angular_damping), "a number in [0, 1)")?;
+        check(what, "halvings", f64::from(self.halvings), self.halvings <= 12, "at most 12")?;
+        self.friction.validate()
+    }
+}

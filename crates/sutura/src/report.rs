@@ -1,0 +1,88 @@
+//! What a step says of itself.
+
+use crate::handle::Handle;
+use crate::model::rod::Rod;
+
+/// What one call of [`World::step`](crate::World::step) did, and what it reached.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StepReport {
+    /// Simulated time at the end \[s\].
+    pub time: f64,
+    /// Substeps accepted.
+    pub substeps: u32,
+    /// Substeps thrown away and done again as two halves.
+    pub rejected: u32,
+    /// Newton iterations, those of rejected substeps among them.
+    pub newton_iterations: u32,
+    /// Whether every accepted substep converged to the tolerance within the budget.
+    pub converged: bool,
+    /// Largest move of a particle in the last Newton iteration of an accepted substep, over the thread's radius.
+    pub residual: f64,
+    /// Largest |elongation| of an element of an inextensible rod, over its rest length; for an elastic rod |strain - T/EA|.
+    pub length_error: f64,
+    /// Least clearance between two pieces of thread over the accepted substeps, in thread diameters: (distance - radii) / diameter.
+    /// `None` when nothing was near.
+    pub thread_clearance: Option<f64>,
+    /// Least clearance between thread and shape, in thread diameters.
+    pub shape_clearance: Option<f64>,
+    /// Contacts that carried force at the end.
+    pub contacts: u32,
+    /// What went wrong.
+    pub incidents: Vec<Incident>,
+}
+
+/// Something that went wrong in a step and what was done about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Incident {
+    /// Simulated time at which it happened \[s\].
+    pub time: f64,
+    /// What happened.
+    pub kind: IncidentKind,
+}
+
+/// Kinds of incident.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum IncidentKind {
+    /// A number of the solution was not finite. The substep was rolled back.
+    NotFinite,
+    /// After all halvings no acceptable substep was found: the world stays at the last good state and the rest of the step was not
+    /// simulated. What it would have crossed or failed to converge on is said.
+    Stuck {
+        /// Why the last attempt was rejected.
+        reason: &'static str,
+    },
+    /// A substep was accepted without convergence to the tolerance.
+    NotConverged {
+        /// Largest move in the last iteration over the thread's radius.
+        residual: f64,
+    },
+    /// A driven grip or shape jumped farther in one step than a motion can: it was moved over the step at the speed that this implies.
+    Teleport {
+        /// Distance \[m\].
+        distance: f64,
+    },
+    /// A time step that is not a finite number > 0, or an input that is not finite: nothing was done.
+    BadInput {
+        /// Which input.
+        what: &'static str,
+    },
+    /// Thread passed through thread or shape between accepted states (also found by the independent audit).
+    PassedThrough {
+        /// The thread, when it was one thread through itself.
+        rod: Option<Handle<Rod>>,
+    },
+}
+
+impl core::fmt::Display for IncidentKind {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            IncidentKind::NotFinite => write!(f, "a number was not finite; the substep was rolled back"),
+            IncidentKind::Stuck { reason } => write!(f, "no acceptable substep was found ({reason}); stayed at the last good state"),
+            IncidentKind::NotConverged { residual } => write!(f, "accepted without convergence: last move {residual:.2e} radii"),
+            IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
+            IncidentKind::BadInput { what } => write!(f, "bad input: {what}; nothing was done"),
+            IncidentKind::PassedThrough { .. } => write!(f, "thread passed through"),
+        }
+    }
+}

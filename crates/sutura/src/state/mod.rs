@@ -1,0 +1,96 @@
+//! What a snapshot must hold: everything that the next step depends on and the user did not give as `Model`.
+
+use crate::handle::Slots;
+use crate::math::Pose;
+use crate::model::grip::{Drive, Hold, LoadKind};
+use glam::{DQuat, DVec3};
+
+/// One vector a quantity.
+#[derive(Clone, Default)]
+pub struct State {
+    /// Simulated time \[s\].
+    pub(crate) time: f64,
+    /// Length of the last accepted substep \[s\]; 0 before the first.
+    pub(crate) last_h: f64,
+
+    pub(crate) position: Vec<DVec3>,
+    pub(crate) velocity: Vec<DVec3>,
+    pub(crate) orientation: Vec<DQuat>,
+    pub(crate) angular_velocity: Vec<DVec3>,
+    /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the multiplier of inextensible elements.
+    pub(crate) tension: Vec<f64>,
+    /// Plastic bend and twist of the joint before each element \[rad\], part of the rest strain.
+    pub(crate) plastic: Vec<DVec3>,
+    /// Plastic arc already travelled by each joint, for hardening \[rad\].
+    pub(crate) hardened: Vec<f64>,
+
+    pub(crate) shape_pose: Vec<Pose>,
+    /// Where the user wants each driven shape at the end of the next step.
+    pub(crate) shape_target: Vec<Pose>,
+
+    pub(crate) grips: Slots<GripState>,
+    pub(crate) loads: Slots<LoadState>,
+
+    /// Contacts of the last accepted substep, sorted by key.
+    pub(crate) thread_contacts: Vec<ThreadContact>,
+    pub(crate) shape_contacts: Vec<ShapeContact>,
+}
+
+/// A grip in action.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct GripState {
+    pub rod: u32,
+    /// Particle (pin, clamp) or element (jaw), counted from the rod's start.
+    pub index: u32,
+    pub hold: Hold,
+    pub drive: Drive,
+    pub ramp: f64,
+    /// Simulated time at which it was taken \[s\].
+    pub taken_at: f64,
+    /// Pose and velocity of the held piece when it was taken.
+    pub taken_pose: Pose,
+    pub taken_velocity: DVec3,
+    pub taken_spin: DVec3,
+    /// Pose commanded for the end of the last step and of the next one.
+    pub pose: Pose,
+    pub target: Pose,
+    /// For a clamp: rotation from the commanded orientation to the frames before and after the particle, at rest.
+    pub clamp_before: DQuat,
+    pub clamp_after: DQuat,
+    /// Force and torque on the thread at the last accepted substep \[N\], \[N m\].
+    pub force: DVec3,
+    pub torque: DVec3,
+}
+
+/// A load in action.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LoadState {
+    pub rod: u32,
+    pub kind: LoadKind,
+}
+
+/// A thread-thread contact that the next substep starts from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ThreadContact {
+    /// Elements, `a < b`, and places on them.
+    pub a: u32,
+    pub b: u32,
+    pub s: f64,
+    pub t: f64,
+    /// Unit normal from b toward a: the side that a is on.
+    pub normal: DVec3,
+    /// Normal force \[N\] and friction force on a \[N\].
+    pub normal_force: f64,
+    pub friction: DVec3,
+}
+
+/// A thread-shape contact that the next substep starts from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShapeContact {
+    pub shape: u32,
+    pub element: u32,
+    pub s: f64,
+    pub normal: DVec3,
+    pub normal_force: f64,
+    pub friction: DVec3,
+}

@@ -1,0 +1,205 @@
+//! Reading a world: slices of its arrays, and what is derived from them. The same views are given to an observer of accepted substeps.
+
+use crate::math::{Pose, log};
+use crate::model::Model;
+use crate::model::rod::RodModel;
+use crate::model::shape::Geometry;
+use crate::state::State;
+use glam::{DQuat, DVec3};
+
+/// All that can be read at one accepted state.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) state: &'a State,
+}
+
+/// One thread at one accepted state.
+#[derive(Clone, Copy)]
+pub struct RodView<'a> {
+    model: &'a Model,
+    state: &'a State,
+    rod: &'a RodModel,
+    slot: u32,
+}
+
+/// One shape at one accepted state.
+#[derive(Debug, Clone, Copy)]
+pub struct ShapeView<'a> {
+    /// Geometry in its own frame.
+    pub geometry: &'a Geometry,
+    /// Where it is.
+    pub pose: Pose,
+    /// Its slot, unique among living shapes ([`Handle::index`](crate::Handle::index)).
+    pub slot: usize,
+}
+
+/// A contact that carries force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ContactView {
+    /// Slot of the thread and element on it.
+    pub a: (usize, usize),
+    /// What it touches.
+    pub b: ContactWith,
+    /// Where on the element, 0 at its first particle, 1 at its second.
+    pub s: f64,
+    /// World point on the centerline of `a` \[m\].
+    pub point: DVec3,
+    /// Unit normal, from `b` toward `a`.
+    pub normal: DVec3,
+    /// Force on `a`, normal and friction \[N\].
+    pub force: DVec3,
+}
+
+/// The other side of a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ContactWith {
+    /// Thread slot, element and place on it.
+    Thread(usize, usize, f64),
+    /// Shape slot.
+    Shape(usize),
+}
+
+/// Mechanical energy \[J\]. Elastic parts are zero at rest; gravity is relative to the world's origin.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion and spin.
+    pub kinetic: f64,
+    /// Of stretch and shear.
+    pub stretch: f64,
+    /// Of bending.
+    pub bend: f64,
+    /// Of twist.
+    pub twist: f64,
+    /// In the gravity field.
+    pub gravity: f64,
+}
+
+impl Energy {
+    /// The sum.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.stretch + self.bend + self.twist + self.gravity
+    }
+}
+
+impl<'a> View<'a> {
+    /// Simulated time \[s\].
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+    /// The living threads in slot order.
+    pub fn rods(&self) -> impl Iterator<Item = RodView<'a>> + use<'a> {
+        let (model, state) = (self.model, self.state);
+        model.rods.iter().map(move |(slot, rod)| RodView { model, state, rod, slot })
+    }
+    /// The living shapes in slot order.
+    pub fn shapes(&self) -> impl Iterator<Item = ShapeView<'a>> + use<'a> {
+        let (model, state) = (self.model, self.state);
+        model.shapes.iter().map(move |(slot, s)| ShapeView { geometry: &s.geometry, pose: state.shape_pose[slot as usize], slot: slot as usize })
+    }
+    pub(crate) fn rod_at(&self, slot: u32) -> Option<RodView<'a>> {
+        let (model, state) = (self.model, self.state);
+        model.rods.at(slot).map(|rod| RodView { model, state, rod, slot })
+    }
+}
+
+impl<'a> RodView<'a> {
+    /// Its slot, unique among living threads ([`Handle::index`](crate::Handle::index)).
+    pub fn slot(&self) -> usize {
+        self.slot as usize
+    }
+    /// Number of elements n; there are n + 1 particles and n - 1 joints.
+    pub fn n_elements(&self) -> usize {
+        self.rod.n_elements as usize
+    }
+    /// Radius \[m\].
+    pub fn radius(&self) -> f64 {
+        self.rod.radius
+    }
+    /// Axial stiffness E A \[N\].
+    pub fn axial_stiffness(&self) -> f64 {
+        self.rod.section.ea
+    }
+    /// Bending stiffness E I and twisting stiffness G J, bending scale included \[N m^2\].
+    pub fn bending_stiffness(&self) -> (f64, f64) {
+        (self.rod.section.ei, self.rod.section.gj)
+    }
+    /// Particle positions \[m\], n + 1.
+    pub fn positions(&self) -> &'a [DVec3] {
+        &self.state.position[self.rod.particles()]
+    }
+    /// Particle velocities \[m/s\], n + 1.
+    pub fn velocities(&self) -> &'a [DVec3] {
+        &self.state.velocity[self.rod.particles()]
+    }
+    /// Material frames, `world_from_material`, n.
+    pub fn orientations(&self) -> &'a [DQuat] {
+        &self.state.orientation[self.rod.frames()]
+    }
+    /// Angular velocities in world axes \[rad/s\], n.
+    pub fn angular_velocities(&self) -> &'a [DVec3] {
+        &self.state.angular_velocity[self.rod.frames()]
+    }
+    /// Rest lengths of the elements \[m\], n.
+    pub fn rest_lengths(&self) -> &'a [f64] {
+        &self.model.rest_length[self.rod.frames()]
+    }
+    /// Rest length of the thread \[m\].
+    pub fn rest_length(&self) -> f64 {
+        self.rest_lengths().iter().sum()
+    }
+    /// Rest arc length of a particle from the start \[m\].
+    pub fn arc(&self, particle: usize) -> f64 {
+        self.rest_lengths()[..particle].iter().sum()
+    }
+    /// Tension in an element \[N\], positive when stretched.
+    pub fn tension(&self, element: usize) -> f64 {
+        self.internal_force(element).z
+    }
+    /// Force carried by an element along its directors d1, d2 (shear) and d3 (tension) \[N\].
+    pub fn internal_force(&self, element: usize) -> DVec3 {
+        crate::rod::internal_force(self.model, self.state, self.rod, self.rod.first_frame as usize + element)
+    }
+    /// Bend and twist of a joint (between elements `joint` and `joint + 1`) less its rest value, along d1, d2, d3 of the frame halfway \[1/m\].
+    pub fn strain(&self, joint: usize) -> DVec3 {
+        let f = self.rod.first_frame as usize + joint + 1;
+        crate::rod::joint_angle(self.model, self.state, f) / self.model.joint_length[f]
+    }
+    /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\]. Damping is not part of it.
+    pub fn moment(&self, joint: usize) -> DVec3 {
+        let s = self.strain(joint);
+        DVec3::new(s.x * self.rod.section.ei, s.y * self.rod.section.ei, s.z * self.rod.section.gj)
+    }
+    /// Largest |length - rest length| / rest length of an element.
+    pub fn max_elongation(&self) -> f64 {
+        self.elongations().fold(0.0, |a, e| if e.abs() > a { e.abs() } else { a })
+    }
+    /// (length - rest length) / rest length of each element.
+    pub fn elongations(&self) -> impl Iterator<Item = f64> + use<'a> {
+        let (x, l) = (self.positions(), self.rest_lengths());
+        l.iter().enumerate().map(move |(j, l)| ((x[j + 1] - x[j]).length() - l) / l)
+    }
+    /// Largest tension of an element \[N\].
+    pub fn max_tension(&self) -> f64 {
+        (0..self.n_elements()).map(|j| self.tension(j)).fold(f64::NEG_INFINITY, f64::max)
+    }
+    /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is kept).
+    pub fn twist(&self) -> f64 {
+        let q = self.orientations();
+        let mut angle = 0.0;
+        for j in 1..q.len() {
+            let (t0, t1) = (q[j - 1] * DVec3::Z, q[j] * DVec3::Z);
+            let carried = crate::math::rotation_arc(t0, t1) * q[j - 1];
+            angle += log(carried.conjugate() * q[j]).z;
+        }
+        angle / core::f64::consts::TAU
+    }
+    /// Mechanical energy of this thread.
+    pub fn energy(&self) -> Energy {
+        crate::rod::energy(self.model, self.state, self.rod)
+    }
+    /// Linear momentum \[kg m/s\].
+    pub fn momentum(&self) -> DVec3 {
+        self.rod.particles().map(|i| self.state.velocity[i] * self.model.mass[i]).sum()
+    }
+}

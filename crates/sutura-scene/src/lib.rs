@@ -1,1 +1,23 @@
-//! placeholder
+//! Scenes of the thread simulator as files: read, run, probed, checked and recorded.
+//!
+//! A scene is a TOML text (`docs/formats.md` has every key). [`Scene::load`] reads one, [`Runner`] steps it frame by frame, and
+//! [`Runner::finish`] hands over an [`Outcome`]: the report, the time series and the trajectory. Units are converted here, once;
+//! everything past the loader is in SI units.
+
+mod error;
+pub mod presets;
+mod report;
+mod runner;
+mod samples;
+mod scene;
+mod trajectory;
+
+pub use error::{Problem, SceneError};
+pub use report::{
+    CheckReport, CheckValue, Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series, SolverReport,
+    ThreadReport, WorkReport,
+};
+pub use runner::{Progress, Runner};
+pub use samples::{Sample, samples};
+pub use scene::Scene;
+pub use trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory, TrajectoryError};

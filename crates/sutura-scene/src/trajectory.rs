@@ -1,0 +1,307 @@
+//! Recordings: positions and frames over time, in a small binary file that reads back.
+
+use std::path::Path;
+
+/// A recording of a run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trajectory {
+    /// What was recorded.
+    pub header: Header,
+    /// Recorded frames in order of time.
+    pub frames: Vec<Frame>,
+}
+
+/// What a recording holds.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Header {
+    /// Name of the scene.
+    pub scene: String,
+    /// Version of the program that wrote it.
+    pub version: String,
+    /// Frames per second of the simulation.
+    pub frame_rate: f64,
+    /// The threads, in the order of the frames.
+    pub threads: Vec<Thread>,
+    /// The shapes, in the order of the frames.
+    pub shapes: Vec<Shape>,
+    /// Names of the grips, in the order of the frames.
+    pub grips: Vec<String>,
+}
+
+/// A recorded thread.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Thread {
+    /// Name in the scene.
+    pub name: String,
+    /// Radius \[m\].
+    pub radius: f64,
+    /// Elements n; a frame has n + 1 positions and n orientations.
+    pub elements: usize,
+}
+
+/// A recorded shape.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Shape {
+    /// Name in the scene.
+    pub name: String,
+    /// What it looks like in its own frame.
+    pub outline: ShapeOutline,
+}
+
+/// Geometry of a shape in its own frame, lengths in meters (see `sutura::Geometry`).
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ShapeOutline {
+    /// The half space below z = 0 is solid.
+    Plane,
+    /// A ball.
+    Sphere {
+        /// Radius \[m\].
+        radius: f64,
+    },
+    /// About the z axis.
+    Capsule {
+        /// Radius \[m\].
+        radius: f64,
+        /// Half the straight part \[m\].
+        half_length: f64,
+    },
+    /// About the z axis.
+    Cylinder {
+        /// Radius \[m\].
+        radius: f64,
+        /// Half the length \[m\].
+        half_length: f64,
+    },
+    /// A box.
+    Box {
+        /// Half the sides \[m\].
+        half_sides: [f64; 3],
+    },
+    /// Triangles.
+    Mesh {
+        /// Corners \[m\].
+        vertices: Vec<[f64; 3]>,
+        /// Corners of each triangle.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+/// One recorded frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// Simulated time \[s\].
+    pub time: f64,
+    /// Particle positions of each thread \[m\].
+    pub positions: Vec<Vec<[f32; 3]>>,
+    /// Material frames of each thread, `world_from_material` as x, y, z, w.
+    pub orientations: Vec<Vec<[f32; 4]>>,
+    /// Pose of each shape: position \[m\] and orientation as x, y, z, w.
+    pub shapes: Vec<([f32; 3], [f32; 4])>,
+    /// Where each grip holds \[m\]; `None` while it does not.
+    pub grips: Vec<Option<[f32; 3]>>,
+}
+
+/// Why a recording could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrajectoryError {
+    /// The file could not be opened, written or read.
+    #[error("recording: {0}")]
+    Io(#[from] std::io::Error),
+    /// The file is not a recording, of a later version, cut short or damaged.
+    #[error("recording: {0}")]
+    Damaged(String),
+}
+
+impl Trajectory {
+    /// The recorded frames in order.
+    pub fn iter(&self) -> std::slice::Iter<'_, Frame> {
+        self.frames.iter()
+    }
+    /// The recorded frame nearest to a time.
+    pub fn nearest(&self, time: f64) -> Option<&Frame> {
+        self.frames.iter().min_by(|a, b| (a.time - time).abs().total_cmp(&(b.time - time).abs()))
+    }
+    /// Writes the recording to a file.
+    pub fn write_to(&self, path: &Path) -> Result<(), TrajectoryError> {
+        std::fs::write(path, self.to_bytes()).map_err(TrajectoryError::Io)
+    }
+    /// Reads a recording from a file.
+    pub fn read_from(path: &Path) -> Result<Self, TrajectoryError> {
+        Self::from_bytes(&std::fs::read(path)?)
+    }
+}
+
+impl<'a> IntoIterator for &'a Trajectory {
+    type Item = &'a Frame;
+    type IntoIter = std::slice::Iter<'a, Frame>;
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+const MAGIC: &[u8; 8] = b"SUTURATR";
+const VERSION: u32 = 1;
+
+impl Trajectory {
+    /// The bytes of the file: `SUTURATR`, version, header length, header as JSON, number of frames, frames, checksum.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let header = serde_json::to_vec(&self.header).unwrap_or_default();
+        let mut out = Vec::with_capacity(64 + header.len() + self.frames.len() * self.frame_bytes());
+        out.extend_from_slice(MAGIC);
+        out.extend_from_slice(&VERSION.to_le_bytes());
+        out.extend_from_slice(&(header.len() as u32).to_le_bytes());
+        out.extend_from_slice(&header);
+        out.extend_from_slice(&(self.frames.len() as u64).to_le_bytes());
+        let put = |v: f32, out: &mut Vec<u8>| out.extend_from_slice(&v.to_le_bytes());
+        for frame in &self.frames {
+            out.extend_from_slice(&frame.time.to_le_bytes());
+            for (x, q) in frame.positions.iter().zip(&frame.orientations) {
+                x.iter().flatten().for_each(|v| put(*v, &mut out));
+                q.iter().flatten().for_each(|v| put(*v, &mut out));
+            }
+            for (x, q) in &frame.shapes {
+                x.iter().chain(q).for_each(|v| put(*v, &mut out));
+            }
+            for grip in &frame.grips {
+                // A grip that does not hold is written as not-a-number.
+                grip.unwrap_or([f32::NAN; 3]).iter().for_each(|v| put(*v, &mut out));
+            }
+        }
+        let sum = crc32fast::hash(&out);
+        out.extend_from_slice(&sum.to_le_bytes());
+        out
+    }
+
+    fn frame_bytes(&self) -> usize {
+        let threads: usize = self.header.threads.iter().map(|t| 12 * (t.elements + 1) + 16 * t.elements).sum();
+        8 + threads + 28 * self.header.shapes.len() + 12 * self.header.grips.len()
+    }
+
+    /// Reads what [`Trajectory::to_bytes`] wrote.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, TrajectoryError> {
+        let damaged = |why: &str| TrajectoryError::Damaged(why.into());
+        if bytes.len() < 28 || &bytes[..8] != MAGIC {
+            return Err(damaged("not a recording (it does not begin with SUTURATR)"));
+        }
+        let mut reader = Reader { bytes: &bytes[..bytes.len() - 4], at: 8 };
+        let short = || damaged("cut short");
+        let version = reader.u32().ok_or_else(short)?;
+        if version != VERSION {
+            return Err(TrajectoryError::Damaged(format!("version {version}, this program reads version {VERSION}")));
+        }
+        let stored = u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap_or_default());
+        if crc32fast::hash(reader.bytes) != stored {
+            return Err(damaged("the checksum does not fit: cut short or changed"));
+        }
+        let length = reader.u32().ok_or_else(short)? as usize;
+        let header: Header = serde_json::from_slice(reader.take(length).ok_or_else(short)?).map_err(|e| TrajectoryError::Damaged(format!("header: {e}")))?;
+        let count = reader.u64().ok_or_else(short)?;
+        let mut trajectory = Trajectory { header, frames: Vec::new() };
+        // The size must fit before anything is allocated for it.
+        let wanted = trajectory.checked_frame_bytes().and_then(|b| b.checked_mul(count));
+        if wanted != Some((reader.bytes.len() - reader.at) as u64) {
+            return Err(damaged("the number of frames does not fit the length of the file"));
+        }
+        for _ in 0..count {
+            let frame = reader.frame(&trajectory.header).ok_or_else(short)?;
+            trajectory.frames.push(frame);
+        }
+        Ok(trajectory)
+    }
+
+    fn checked_frame_bytes(&self) -> Option<u64> {
+        let mut sum: u64 = 8;
+        for t in &self.header.threads {
+            sum = sum.checked_add((t.elements as u64).checked_mul(28)?.checked_add(12)?)?;
+        }
+        Some(sum + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64)
+    }
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Reader<'a> {
+    fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+        let piece = self.bytes.get(self.at..self.at.checked_add(n)?)?;
+        self.at += n;
+        Some(piece)
+    }
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        self.take(N)?.try_into().ok()
+    }
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+    fn f32s<const N: usize>(&mut self) -> Option<[f32; N]> {
+        let mut out = [0.0; N];
+        for v in &mut out {
+            *v = f32::from_le_bytes(self.array()?);
+        }
+        Some(out)
+    }
+    fn frame(&mut self, header: &Header) -> Option<Frame> {
+        let mut frame = Frame { time: f64::from_le_bytes(self.array()?), ..Frame::default() };
+        for thread in &header.threads {
+            frame.positions.push((0..=thread.elements).map(|_| self.f32s()).collect::<Option<_>>()?);
+            frame.orientations.push((0..thread.elements).map(|_| self.f32s()).collect::<Option<_>>()?);
+        }
+        for _ in &header.shapes {
+            frame.shapes.push((self.f32s()?, self.f32s()?));
+        }
+        for _ in &header.grips {
+            let x: [f32; 3] = self.f32s()?;
+            frame.grips.push((!x[0].is_nan()).then_some(x));
+        }
+        Some(frame)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Trajectory {
+        let header = Header {
+            scene: "s".into(),
+            version: "1".into(),
+            frame_rate: 60.0,
+            threads: vec![Thread { name: "a".into(), radius: 1e-4, elements: 2 }],
+            shapes: vec![Shape { name: "post".into(), outline: ShapeOutline::Cylinder { radius: 0.005, half_length: 0.01 } }],
+            grips: vec!["left".into(), "right".into()],
+        };
+        let frame = |t: f64| Frame {
+            time: t,
+            positions: vec![vec![[0.0, 0.5, t as f32]; 3]],
+            orientations: vec![vec![[0.0, 0.0, 0.0, 1.0]; 2]],
+            shapes: vec![([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0])],
+            grips: vec![Some([0.1, 0.2, 0.3]), None],
+        };
+        Trajectory { header, frames: vec![frame(0.0), frame(0.5)] }
+    }
+
+    #[test]
+    fn reads_back_what_it_wrote() {
+        let t = sample();
+        assert_eq!(Trajectory::from_bytes(&t.to_bytes()).unwrap(), t);
+        assert_eq!(t.nearest(0.4).unwrap().time, 0.5);
+    }
+
+    #[test]
+    fn every_cut_and_every_flipped_byte_is_noticed() {
+        let bytes = sample().to_bytes();
+        for n in 0..bytes.len() {
+            assert!(Trajectory::from_bytes(&bytes[..n]).is_err(), "cut at {n}");
+            let mut changed = bytes.clone();
+            changed[n] ^= 0x10;
+            assert!(Trajectory::from_bytes(&changed).is_err(), "flipped at {n}");
+        }
+    }
+}

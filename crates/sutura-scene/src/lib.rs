@@ -4,13 +4,16 @@
 //! [`Runner::finish`] hands over an [`Outcome`]: the report, the time series and the trajectory. Units are converted here, once;
 //! everything past the loader is in SI units.
 
+mod doc;
 mod error;
+mod expr;
 pub mod presets;
 mod report;
 mod runner;
 mod samples;
 mod scene;
 mod trajectory;
+mod units;
 
 pub use error::{Problem, SceneError};
 pub use report::{

@@ -1,1 +1,433 @@
-//! audit
+//! The independent audit: did anything pass through anything, how near did things come, how far did threads stretch.
+//!
+//! It looks only at positions at accepted states, with its own distances and its own search for near pairs, so that it cannot share a
+//! mistake with the contact code. Between two states it takes every particle to move along a straight line (for a shape: a straight line
+//! as seen from the shape).
+//!
+//! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements with less than
+//!   `pi r` of thread between them are left out.
+//! - Thread through shape: the centerline is inside a solid, or comes within a thousandth of the radius of a mesh's surface.
+//! - Clearance: (distance of centerlines - radii) / mean diameter at the states themselves, 0 touches, negative overlaps; to a shape
+//!   (distance of centerline from surface - radius) / diameter. Only what is nearer than one diameter is looked at.
+//!
+//! A thread or shape that appears, or whose number of particles changes, is taken up from its first state on; a thread removed and replaced
+//! by one of the same size and radius in the same slot between two states cannot be told from a move.
+
+mod distance;
+
+use crate::knot::boxes::{Aabb, BoxTree};
+use crate::math::log;
+use crate::{Geometry, Pose, ShapeView, View};
+use distance::{segment_solid, segment_triangle, segments, time_within};
+use glam::DVec3;
+
+/// What passed through what.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pair {
+    /// Two pieces of thread: slot of the thread and element.
+    Threads {
+        /// The one.
+        a: (usize, usize),
+        /// The other.
+        b: (usize, usize),
+    },
+    /// A piece of thread and a shape.
+    Shape {
+        /// Slot of the thread and element.
+        thread: (usize, usize),
+        /// Slot of the shape.
+        shape: usize,
+    },
+}
+
+/// One passage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Simulated time of the state at which it was seen \[s\].
+    pub time: f64,
+    /// What crossed.
+    pub what: Pair,
+}
+
+/// The place of least clearance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closest {
+    /// Clearance in diameters.
+    pub clearance: f64,
+    /// Simulated time \[s\].
+    pub time: f64,
+    /// Between what.
+    pub what: Pair,
+}
+
+/// What the audit has seen so far.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AuditReport {
+    /// Whether anything passed through anything.
+    pub passes_through: bool,
+    /// The passages in order of time, at most the first [`Audit::MOST_CROSSINGS`].
+    pub crossings: Vec<Crossing>,
+    /// Least clearance of two pieces of thread in diameters; `None` when none came nearer than one diameter.
+    pub thread_clearance: Option<f64>,
+    /// Where and when that was.
+    pub thread_closest: Option<Closest>,
+    /// Least clearance of thread and shape in diameters; `None` when none came nearer than one diameter.
+    pub shape_clearance: Option<f64>,
+    /// Where and when that was.
+    pub shape_closest: Option<Closest>,
+    /// Largest |length - rest length| / rest length of an element, by slot of the thread.
+    pub max_elongation: Vec<(usize, f64)>,
+    /// States looked at.
+    pub states: u64,
+    /// States with a number that is not finite; they (for a shape: it) were left out.
+    pub states_not_finite: u64,
+}
+
+/// Watches a world. Give it every accepted state ([`World::step_with`](crate::World::step_with)).
+#[derive(Debug, Default)]
+pub struct Audit {
+    report: AuditReport,
+    now: Frame,
+    before: Frame,
+    /// Rest arc length of each particle from the start of its thread.
+    arc: Vec<f64>,
+    /// One a thread: boxes around what its elements swept.
+    trees: Vec<BoxTree>,
+    shapes: Vec<SeenShape>,
+}
+
+/// Positions at one state.
+#[derive(Debug, Default)]
+struct Frame {
+    rods: Vec<SeenRod>,
+    position: Vec<DVec3>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct SeenRod {
+    slot: usize,
+    radius: f64,
+    first: usize,
+    n_particles: usize,
+    /// Where its particles are in the frame before, when it was there.
+    first_before: Option<usize>,
+}
+
+#[derive(Debug)]
+struct SeenShape {
+    slot: usize,
+    pose: Pose,
+    geometry: Geometry,
+    bounds: Option<Aabb>,
+    triangles: Triangles,
+    /// Whether it is there in the state at hand.
+    alive: bool,
+}
+
+/// One thread at one state, as plain slices.
+#[derive(Debug, Clone, Copy)]
+struct RodSlice<'a> {
+    slot: usize,
+    radius: f64,
+    positions: &'a [DVec3],
+    rest_lengths: &'a [f64],
+}
+
+/// Centerlines nearer than this part of the radius have crossed.
+const TOUCHING: f64 = 1e-3;
+
+impl Audit {
+    /// The number of passages that are listed one by one.
+    pub const MOST_CROSSINGS: usize = 256;
+
+    /// An audit that has seen nothing.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What was seen so far.
+    pub fn report(&self) -> &AuditReport {
+        &self.report
+    }
+
+    /// Looks at an accepted state, and at what was swept since the one before.
+    pub fn observe(&mut self, view: View<'_>) {
+        let rods = view.rods().map(|r| RodSlice { slot: r.slot(), radius: r.radius(), positions: r.positions(), rest_lengths: r.rest_lengths() });
+        self.observe_slices(view.time(), rods, view.shapes());
+    }
+
+    fn observe_slices<'a>(&mut self, time: f64, rods: impl Iterator<Item = RodSlice<'a>>, shapes: impl Iterator<Item = ShapeView<'a>>) {
+        self.report.states += 1;
+        core::mem::swap(&mut self.now, &mut self.before);
+        if !self.take_up(rods) {
+            self.report.states_not_finite += 1;
+            // The last good state stays the one to sweep from.
+            core::mem::swap(&mut self.now, &mut self.before);
+            return;
+        }
+        self.refit();
+        self.threads(time);
+        self.all_shapes(time, shapes);
+    }
+
+    /// Copies the threads, and measures their elongation. Whether all numbers are finite.
+    fn take_up<'a>(&mut self, rods: impl Iterator<Item = RodSlice<'a>>) -> bool {
+        let Audit { report, now, before, arc, .. } = self;
+        now.rods.clear();
+        now.position.clear();
+        arc.clear();
+        for rod in rods {
+            let n_particles = rod.positions.len();
+            if n_particles < 2 || rod.rest_lengths.len() + 1 != n_particles {
+                continue;
+            }
+            if rod.positions.iter().any(|p| !p.is_finite()) {
+                return false;
+            }
+            let same = |old: &&SeenRod| old.slot == rod.slot && old.n_particles == n_particles && old.radius.to_bits() == rod.radius.to_bits();
+            let first_before = before.rods.iter().find(same).map(|old| old.first);
+            now.rods.push(SeenRod { slot: rod.slot, radius: rod.radius, first: now.position.len(), n_particles, first_before });
+            now.position.extend_from_slice(rod.positions);
+            let (mut s, mut elongation) = (0.0, 0.0_f64);
+            arc.push(0.0);
+            for (x, l) in rod.positions.windows(2).zip(rod.rest_lengths) {
+                s += l;
+                arc.push(s);
+                elongation = elongation.max((x[0].distance(x[1]) - l).abs() / l);
+            }
+            match report.max_elongation.iter_mut().find(|e| e.0 == rod.slot) {
+                Some(e) => e.1 = e.1.max(elongation),
+                None => report.max_elongation.push((rod.slot, elongation)),
+            }
+        }
+        true
+    }
+
+    /// Boxes around what each element swept, grown so that two overlap when the elements are within a diameter's clearance.
+    fn refit(&mut self) {
+        if self.trees.len() < self.now.rods.len() {
+            self.trees.resize_with(self.now.rods.len(), BoxTree::default);
+        }
+        for (rod, tree) in self.now.rods.iter().zip(&mut self.trees) {
+            tree.reset(rod.n_particles - 1);
+            for e in 0..rod.n_particles - 1 {
+                let mut b = Aabb::around(&self.now.element(rod, e));
+                if let Some(old) = self.before.element_before(rod, e) {
+                    b = b.union(&Aabb::around(&old));
+                }
+                tree.set(e, b.grown(2.0 * rod.radius));
+            }
+            tree.refit();
+        }
+    }
+
+    fn threads(&mut self, time: f64) {
+        let Audit { report, now, before, arc, trees, .. } = self;
+        for (i, rod) in now.rods.iter().enumerate() {
+            let apart = core::f64::consts::PI * rod.radius;
+            trees[i].pairs(&mut |e, f| {
+                if arc[rod.first + f] - arc[rod.first + e + 1] >= apart {
+                    thread_pair(report, now, before, time, (rod, e), (rod, f));
+                }
+            });
+            for (other, tree) in now.rods.iter().zip(trees.iter()).skip(i + 1) {
+                trees[i].pairs_with(tree, &mut |e, f| thread_pair(report, now, before, time, (rod, e), (other, f)));
+            }
+        }
+    }
+
+    fn all_shapes<'a>(&mut self, time: f64, shapes: impl Iterator<Item = ShapeView<'a>>) {
+        let Audit { report, now, before, trees, shapes: seen, .. } = self;
+        seen.iter_mut().for_each(|s| s.alive = false);
+        for shape in shapes {
+            let known = seen.iter().position(|s| s.slot == shape.slot && s.is(shape.geometry));
+            if !(shape.pose.position.is_finite() && shape.pose.orientation.is_finite()) {
+                report.states_not_finite += 1;
+                // Its last good pose stays the one to sweep from.
+                known.into_iter().for_each(|k| seen[k].alive = true);
+                continue;
+            }
+            let k = known.unwrap_or_else(|| {
+                seen.push(SeenShape::new(&shape));
+                seen.len() - 1
+            });
+            let old_pose = known.map(|_| seen[k].pose);
+            seen[k].pose = shape.pose;
+            seen[k].alive = true;
+            for (rod, tree) in now.rods.iter().zip(trees.iter()) {
+                let mut element = |e: usize| thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
+                match &seen[k].bounds {
+                    Some(bounds) => {
+                        let reach = bounds.swept(&old_pose.unwrap_or(shape.pose), &shape.pose).grown(rod.radius);
+                        tree.any(&reach, &mut |e| {
+                            element(e);
+                            false
+                        });
+                    }
+                    None => (0..rod.n_particles - 1).for_each(element),
+                }
+            }
+        }
+        seen.retain(|s| s.alive);
+    }
+}
+
+impl Frame {
+    fn element(&self, rod: &SeenRod, e: usize) -> [DVec3; 2] {
+        [self.position[rod.first + e], self.position[rod.first + e + 1]]
+    }
+    /// The same element in this frame, which is the one before.
+    fn element_before(&self, rod: &SeenRod, e: usize) -> Option<[DVec3; 2]> {
+        rod.first_before.map(|first| [self.position[first + e], self.position[first + e + 1]])
+    }
+}
+
+impl AuditReport {
+    fn cross(&mut self, time: f64, what: Pair) {
+        self.passes_through = true;
+        if self.crossings.len() < Audit::MOST_CROSSINGS {
+            self.crossings.push(Crossing { time, what });
+        }
+    }
+}
+
+fn lerp(from: [DVec3; 2], to: [DVec3; 2], t: f64) -> [DVec3; 2] {
+    [from[0].lerp(to[0], t), from[1].lerp(to[1], t)]
+}
+
+fn thread_pair(report: &mut AuditReport, now: &Frame, before: &Frame, time: f64, a: (&SeenRod, usize), b: (&SeenRod, usize)) {
+    let (p, q) = (now.element(a.0, a.1), now.element(b.0, b.1));
+    let d = segments(p, q);
+    let radii = a.0.radius + b.0.radius;
+    let clearance = (d - radii) / radii;
+    let what = Pair::Threads { a: (a.0.slot, a.1), b: (b.0.slot, b.1) };
+    if clearance < report.thread_clearance.unwrap_or(1.0) {
+        report.thread_clearance = Some(clearance);
+        report.thread_closest = Some(Closest { clearance, time, what });
+    }
+    let (Some(old_p), Some(old_q)) = (before.element_before(a.0, a.1), before.element_before(b.0, b.1)) else { return };
+    let limit = TOUCHING * a.0.radius.min(b.0.radius);
+    let relative = |i: usize, j: usize| ((p[i] - old_p[i]) - (q[j] - old_q[j])).length();
+    let rate = relative(0, 0).max(relative(0, 1)).max(relative(1, 0)).max(relative(1, 1));
+    if d - rate > limit {
+        return;
+    }
+    if time_within(&|t| segments(lerp(old_p, p, t), lerp(old_q, q, t)), rate, limit, limit).is_some() {
+        report.cross(time, what);
+    }
+}
+
+#[allow(clippy::too_many_arguments)] // One state of an element and one of a shape, now and before.
+fn thread_and_shape(report: &mut AuditReport, time: f64, rod: &SeenRod, e: usize, now: &Frame, before: &Frame, shape: &SeenShape, old_pose: Option<Pose>) {
+    let seen_from = |pose: &Pose, x: [DVec3; 2]| x.map(|x| pose.inverse_transform_point(x));
+    let p = seen_from(&shape.pose, now.element(rod, e));
+    let old = before.element_before(rod, e).zip(old_pose).map_or(p, |(x, pose)| seen_from(&pose, x));
+    let rate = p[0].distance(old[0]).max(p[1].distance(old[1]));
+    let near = 3.0 * rod.radius; // A clearance of one diameter.
+    let what = Pair::Shape { thread: (rod.slot, e), shape: shape.slot };
+    let mut look = |d: f64, limit: f64, swept: &dyn Fn(f64) -> f64| {
+        let clearance = (d - rod.radius) / (2.0 * rod.radius);
+        if clearance < report.shape_clearance.unwrap_or(1.0) {
+            report.shape_clearance = Some(clearance);
+            report.shape_closest = Some(Closest { clearance, time, what });
+        }
+        let crosses = d - rate <= limit && time_within(&swept, rate, limit, TOUCHING * rod.radius).is_some();
+        if crosses {
+            report.cross(time, what);
+        }
+        crosses
+    };
+    if let Geometry::Mesh { vertices, triangles } = &shape.geometry {
+        let reach = Aabb::around(&p).union(&Aabb::around(&old)).grown(near);
+        shape.triangles.tree.any(&reach, &mut |k| {
+            let corners = triangles[shape.triangles.order[k] as usize].map(|v| vertices[v as usize]);
+            // One passage an element is enough.
+            look(segment_triangle(p, corners), TOUCHING * rod.radius, &|t| segment_triangle(lerp(old, p, t), corners))
+        });
+    } else {
+        let middle = 0.5 * (p[0] + p[1]);
+        if segment_solid([middle, middle], &shape.geometry) - 0.5 * p[0].distance(p[1]) > near.max(rate) {
+            return;
+        }
+        look(segment_solid(p, &shape.geometry), 0.0, &|t| segment_solid(lerp(old, p, t), &shape.geometry));
+    }
+}
+
+impl SeenShape {
+    fn new(shape: &ShapeView<'_>) -> Self {
+        let symmetric = |half: DVec3| Some(Aabb { min: -half, max: half });
+        let mut triangles = Triangles::default();
+        let bounds = match shape.geometry {
+            Geometry::Plane => None,
+            Geometry::Sphere { radius } => symmetric(DVec3::splat(*radius)),
+            Geometry::Capsule { radius, half_length } => symmetric(DVec3::new(*radius, *radius, radius + half_length)),
+            Geometry::Cylinder { radius, half_length } => symmetric(DVec3::new(*radius, *radius, *half_length)),
+            Geometry::Box { half_sides } => symmetric(*half_sides),
+            Geometry::Mesh { vertices, triangles: t } => {
+                triangles = Triangles::new(vertices, t);
+                Some(Aabb::around(vertices))
+            }
+        };
+        SeenShape { slot: shape.slot, pose: shape.pose, geometry: shape.geometry.clone(), bounds, triangles, alive: true }
+    }
+
+    /// Whether this is the geometry known. A mesh is known by its size and its ends, as comparing all of it at each state would cost
+    /// more than the audit.
+    fn is(&self, geometry: &Geometry) -> bool {
+        match (&self.geometry, geometry) {
+            (Geometry::Mesh { vertices: v, triangles: t }, Geometry::Mesh { vertices: w, triangles: u }) => {
+                v.len() == w.len() && t.len() == u.len() && v.first() == w.first() && v.last() == w.last()
+            }
+            (a, b) => a == b,
+        }
+    }
+}
+
+impl Aabb {
+    /// World box around everything that a box of the body sweeps from one pose to the other, turning included.
+    fn swept(&self, from: &Pose, to: &Pose) -> Aabb {
+        let (middle, half) = (0.5 * (self.min + self.max), 0.5 * (self.max - self.min));
+        let at = |pose: &Pose| {
+            let m = glam::DMat3::from_quat(pose.orientation);
+            let h = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+            let c = pose.transform_point(middle);
+            Aabb { min: c - h, max: c + h }
+        };
+        let angle = log((to.orientation * from.orientation.conjugate()).normalize()).length();
+        at(from).union(&at(to)).grown(angle * (middle.length() + half.length()))
+    }
+}
+
+/// The triangles of a mesh in an order that follows space (along a Morton curve), so that a tree over the order is a good one.
+#[derive(Debug, Default)]
+struct Triangles {
+    order: Vec<u32>,
+    tree: BoxTree,
+}
+
+impl Triangles {
+    fn new(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Self {
+        let bounds = Aabb::around(vertices);
+        let size = (bounds.max - bounds.min).max(DVec3::splat(f64::MIN_POSITIVE));
+        let corners = |t: u32| triangles[t as usize].map(|v| vertices[v as usize]);
+        let place = |t: u32| {
+            let [a, b, c] = corners(t);
+            // Ten bits an axis.
+            let cell = (((a + b + c) / 3.0 - bounds.min) / size * 1023.0).clamp(DVec3::ZERO, DVec3::splat(1023.0));
+            let cell = [cell.x as u32, cell.y as u32, cell.z as u32];
+            (0..10).fold(0_u32, |code, bit| (0..3).fold(code, |code, axis| code | ((cell[axis] >> bit) & 1) << (3 * bit + axis as u32)))
+        };
+        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+        order.sort_by_cached_key(|t| (place(*t), *t));
+        let mut tree = BoxTree::default();
+        tree.reset(order.len());
+        for (k, t) in order.iter().enumerate() {
+            tree.set(k, Aabb::around(&corners(*t)));
+        }
+        tree.refit();
+        Triangles { order, tree }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,9 +4,11 @@
 //! [`Runner::finish`] hands over an [`Outcome`]: the report, the time series and the trajectory. Units are converted here, once;
 //! everything past the loader is in SI units.
 
+mod curve;
 mod doc;
 mod error;
 mod expr;
+mod motion;
 pub mod presets;
 mod report;
 mod runner;

@@ -74,6 +74,29 @@ impl<T> Slots<T> {
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (u32, &mut T)> {
         self.slots.iter_mut().enumerate().filter_map(|(i, (_, v))| v.as_mut().map(|v| (i as u32, v)))
     }
+    /// A copy into memory that is already there.
+    pub(crate) fn copy_from(&mut self, from: &Self)
+    where
+        T: Clone,
+    {
+        self.slots.clone_from(&from.slots);
+    }
+    pub(crate) fn retain(&mut self, keep: impl Fn(&T) -> bool) {
+        for (_, slot) in &mut self.slots {
+            if slot.as_ref().is_some_and(|v| !keep(v)) {
+                *slot = None;
+            }
+        }
+    }
+    pub(crate) fn raw(&self) -> &Vec<(u32, Option<T>)> {
+        &self.slots
+    }
+    pub(crate) fn from_raw(slots: Vec<(u32, Option<T>)>) -> Self {
+        Slots { slots }
+    }
+    pub(crate) fn len(&self) -> usize {
+        self.slots.len()
+    }
     pub(crate) fn at(&self, index: u32) -> Option<&T> {
         self.slots.get(index as usize).and_then(|(_, v)| v.as_ref())
     }

@@ -3,15 +3,22 @@
 //! SI units throughout; right-handed; no up axis (gravity is a vector). Energy, tension and twist signs: tension is positive when
 //! stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
 
+pub mod audit;
 mod collide;
 pub mod error;
 pub mod handle;
+pub mod knot;
 pub mod math;
 mod model;
+mod newton;
 mod params;
 mod report;
 mod rod;
+mod row;
+mod scratch;
+mod snapshot;
 mod state;
+mod step;
 mod view;
 mod world;
 

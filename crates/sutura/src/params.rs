@@ -61,6 +61,9 @@ impl Default for Settings {
     }
 }
 
+/// Normal stiffness of a contact over E times the radius (the scale of Hertz stiffness of two crossed cylinders).
+pub(crate) const CONTACT_STIFFNESS: f64 = 1.0;
+
 impl Settings {
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let what = "settings";

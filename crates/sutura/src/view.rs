@@ -134,15 +134,15 @@ impl<'a> RodView<'a> {
     }
     /// Material frames, `world_from_material`, n.
     pub fn orientations(&self) -> &'a [DQuat] {
-        &self.state.orientation[self.rod.frames()]
+        &self.state.orientation[self.rod.elements()]
     }
     /// Angular velocities in world axes \[rad/s\], n.
     pub fn angular_velocities(&self) -> &'a [DVec3] {
-        &self.state.angular_velocity[self.rod.frames()]
+        &self.state.angular_velocity[self.rod.elements()]
     }
     /// Rest lengths of the elements \[m\], n.
     pub fn rest_lengths(&self) -> &'a [f64] {
-        &self.model.rest_length[self.rod.frames()]
+        &self.model.rest_length[self.rod.elements()]
     }
     /// Rest length of the thread \[m\].
     pub fn rest_length(&self) -> f64 {
@@ -158,11 +158,11 @@ impl<'a> RodView<'a> {
     }
     /// Force carried by an element along its directors d1, d2 (shear) and d3 (tension) \[N\].
     pub fn internal_force(&self, element: usize) -> DVec3 {
-        crate::rod::internal_force(self.model, self.state, self.rod, self.rod.first_frame as usize + element)
+        crate::rod::internal_force(self.model, self.state, self.rod, self.rod.first as usize + element)
     }
     /// Bend and twist of a joint (between elements `joint` and `joint + 1`) less its rest value, along d1, d2, d3 of the frame halfway \[1/m\].
     pub fn strain(&self, joint: usize) -> DVec3 {
-        let f = self.rod.first_frame as usize + joint + 1;
+        let f = self.rod.first as usize + joint + 1;
         crate::rod::joint_angle(self.model, self.state, f) / self.model.joint_length[f]
     }
     /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\]. Damping is not part of it.

@@ -1,22 +1,25 @@
-//! The world: what a user builds, steps and reads.
+//! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
-use crate::model::Model;
-use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec};
-use crate::model::rod::{Rod, RodSpec};
+use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
+use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
+use crate::model::{Model, ShapeModel, material::Section};
 use crate::params::{Friction, Settings};
-use crate::report::StepReport;
-use crate::state::State;
-use crate::view::{ContactView, RodView, ShapeView, View};
-use glam::DVec3;
+use crate::report::{Incident, IncidentKind, StepReport};
+use crate::scratch::Scratch;
+use crate::state::{GripState, LoadState, State};
+use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
+use glam::{DQuat, DVec3};
 
 /// Threads, shapes, grips and loads that move together.
+#[derive(Default)]
 pub struct World {
     model: Model,
     state: State,
+    scratch: Scratch,
 }
 
 /// Force \[N\] and torque \[N m\] in world axes, about the place where they act.
@@ -28,127 +31,542 @@ pub struct Wrench {
     pub torque: DVec3,
 }
 
-#[allow(unused_variables)]
+/// Penalty of the multiplier of an inextensible element over its physical stiffness: high enough that one Newton iteration leaves a
+/// hundredth of the physical stretch, low enough to cost no digits.
+const INEXTENSIBLE_PENALTY: f64 = 100.0;
+
+const ROD: Error = Error::StaleHandle { what: "rod" };
+const SHAPE: Error = Error::StaleHandle { what: "shape" };
+const GRIP: Error = Error::StaleHandle { what: "grip" };
+const LOAD: Error = Error::StaleHandle { what: "load" };
+
 impl World {
     /// An empty world.
     pub fn new(settings: Settings) -> Result<Self, Error> {
-        unimplemented!()
+        let mut world = World::default();
+        world.set_settings(settings)?;
+        Ok(world)
     }
     /// The settings.
     pub fn settings(&self) -> &Settings {
-        unimplemented!()
+        &self.model.settings
     }
     /// Changes the settings.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
-        unimplemented!()
+        settings.validate()?;
+        self.model.settings = settings;
+        Ok(())
     }
     /// Friction between two surfaces (indices given in `RodSpec::surface`, `ShapeSpec::surface`).
     pub fn set_friction(&mut self, a: u32, b: u32, friction: Friction) -> Result<(), Error> {
-        unimplemented!()
+        friction.validate()?;
+        let key = (a.min(b), a.max(b));
+        match self.model.friction.binary_search_by_key(&key, |(k, _)| *k) {
+            Ok(i) => self.model.friction[i].1 = friction,
+            Err(i) => self.model.friction.insert(i, (key, friction)),
+        }
+        Ok(())
     }
+
     /// Adds a thread.
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
-        unimplemented!()
+        let low = spec.lower()?;
+        let n = low.rest_lengths.len();
+        let section = Section::round(&spec.material, spec.radius);
+        let (model, state) = (&mut self.model, &mut self.state);
+        let first = model.mass.len();
+        let rod = RodModel {
+            first: first as u32,
+            n_elements: n as u32,
+            radius: spec.radius,
+            section,
+            material: spec.material.clone(),
+            stretch: spec.stretch,
+            surface: spec.surface,
+            contact_stiffness: crate::params::CONTACT_STIFFNESS * spec.material.young_modulus * spec.radius,
+        };
+        let handle: Handle<Rod> = model.rods.insert(rod);
+        for e in 0..=n {
+            let (before, after) = (if e > 0 { low.rest_lengths[e - 1] } else { 0.0 }, if e < n { low.rest_lengths[e] } else { 0.0 });
+            model.rod_of.push(handle.index);
+            model.mass.push(0.0);
+            model.inertia.push(DVec3::ZERO);
+            model.rest_length.push(after);
+            model.inextensible.push(spec.stretch == Stretch::Inextensible);
+            let l = if e < n { after } else { before };
+            let penalty = if spec.stretch == Stretch::Inextensible { INEXTENSIBLE_PENALTY } else { 1.0 };
+            model.stretch_stiffness.push(DVec3::new(section.kga, section.kga, penalty * section.ea) / l);
+            let joint = if e > 0 && e < n { 0.5 * (before + after) } else { 0.0 };
+            model.joint_length.push(joint);
+            let lbar = if joint > 0.0 { joint } else { l };
+            model.bend_stiffness.push(DVec3::new(section.ei, section.ei, section.gj) / lbar);
+            model.bend_damping.push(spec.material.bend_damping);
+            model.rest_half.push(if e < n { low.rest_half[e] } else { DQuat::IDENTITY });
+            state.position.push(spec.centerline[e]);
+            state.orientation.push(if e < n { low.frames[e] } else { DQuat::IDENTITY });
+        }
+        let total = first + n + 1;
+        state.velocity.resize(total, DVec3::ZERO);
+        state.angular_velocity.resize(total, DVec3::ZERO);
+        state.tension.resize(total, 0.0);
+        state.plastic.resize(total, DVec3::ZERO);
+        state.hardened.resize(total, 0.0);
+        for e in first..first + n {
+            if !self.model.inextensible[e] {
+                state.tension[e] = crate::rod::element_strain(&self.model, state, e).z * self.model.stretch_stiffness[e].z;
+            }
+        }
+        self.refresh_masses();
+        Ok(handle)
     }
+
     /// Removes a thread with its grips and loads.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
-        unimplemented!()
+        let gone = self.model.rods.remove(rod).ok_or(ROD)?;
+        let range = gone.particles();
+        let (model, state) = (&mut self.model, &mut self.state);
+        macro_rules! drain {
+            ($($array:expr),* $(,)?) => { $($array.drain(range.clone());)* };
+        }
+        drain!(
+            model.rod_of,
+            model.mass,
+            model.inertia,
+            model.rest_length,
+            model.inextensible,
+            model.stretch_stiffness,
+            model.joint_length,
+            model.bend_stiffness,
+            model.bend_damping,
+            model.rest_half,
+            state.position,
+            state.velocity,
+            state.orientation,
+            state.angular_velocity,
+            state.tension,
+            state.plastic,
+            state.hardened,
+        );
+        let (start, count) = (range.start as u32, range.len() as u32);
+        for (_, other) in model.rods.iter_mut() {
+            if other.first > start {
+                other.first -= count;
+            }
+        }
+        let shift = |e: u32| if e > start { e - count } else { e };
+        state.thread_contacts.retain(|c| !range.contains(&(c.a as usize)) && !range.contains(&(c.b as usize)));
+        for c in &mut state.thread_contacts {
+            (c.a, c.b) = (shift(c.a), shift(c.b));
+        }
+        state.shape_contacts.retain(|c| !range.contains(&(c.element as usize)));
+        for c in &mut state.shape_contacts {
+            c.element = shift(c.element);
+        }
+        state.grips.retain(|g| g.rod != rod.index);
+        state.loads.retain(|l| l.rod != rod.index);
+        Ok(())
     }
+
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
-        unimplemented!()
+        spec.validate()?;
+        let shape = ShapeModel {
+            geometry: spec.geometry.clone(),
+            collider: crate::collide::Collider::new(&spec.geometry)?,
+            surface: spec.surface,
+            motion: spec.motion,
+        };
+        let handle: Handle<Shape> = self.model.shapes.insert(shape);
+        let n = self.model.shapes.len();
+        self.state.shape_pose.resize(n, Pose::IDENTITY);
+        self.state.shape_target.resize(n, Pose::IDENTITY);
+        let pose = Pose::new(spec.pose.position, spec.pose.orientation.normalize());
+        self.state.shape_pose[handle.index()] = pose;
+        self.state.shape_target[handle.index()] = pose;
+        Ok(handle)
     }
+
     /// Removes a shape.
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
-        unimplemented!()
+        self.model.shapes.remove(shape).ok_or(SHAPE)?;
+        self.state.shape_contacts.retain(|c| c.shape != shape.index);
+        Ok(())
     }
+
     /// Pose wanted at the end of the next step for a driven shape. It gets there at constant rate.
     pub fn set_shape_pose(&mut self, shape: Handle<Shape>, pose: Pose) -> Result<(), Error> {
-        unimplemented!()
+        let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
+        if s.motion != ShapeMotion::Driven {
+            return Err(Error::invalid("shape", "motion", s.motion, "Driven, for a pose to be set"));
+        }
+        if !pose.is_valid() {
+            return Err(Error::invalid("shape", "pose", pose, "finite, with a unit quaternion"));
+        }
+        self.state.shape_target[shape.index()] = pose;
+        Ok(())
     }
+
     /// Changes what moves a shape (for instance the force on a pushed one), from the next step on.
     pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
-        unimplemented!()
+        motion.validate()?;
+        self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
+        self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
+        Ok(())
     }
+
     /// Takes hold.
     pub fn insert_grip(&mut self, spec: &GripSpec) -> Result<Handle<Grip>, Error> {
-        unimplemented!()
+        spec.drive.validate()?;
+        crate::error::check("grip", "ramp", spec.ramp, spec.ramp >= 0.0, "a finite time >= 0 [s]")?;
+        let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
+        spec.place.validate("grip", &self.model, rod)?;
+        let n = rod.n_elements;
+        let index = match spec.hold {
+            Hold::Pin | Hold::Clamp => spec.place.particle(&self.model, rod),
+            Hold::Jaw => (spec.place.on_element(&self.model, rod).0 - rod.first as usize) as u32,
+        };
+        if self.state.grips.iter().any(|(_, g)| g.rod == spec.rod.index && nodes_overlap(g, spec.hold, index)) {
+            return Err(Error::invalid("grip", "place", spec.place, "a piece that no other grip holds"));
+        }
+        let i = (rod.first + index) as usize;
+        let state = &self.state;
+        let (mut rest_half, mut half_span) = (DQuat::IDENTITY, DVec3::ZERO);
+        let (position, orientation, velocity, spin) = match spec.hold {
+            Hold::Pin => (state.position[i], DQuat::IDENTITY, state.velocity[i], DVec3::ZERO),
+            Hold::Clamp => {
+                let before = (index > 0).then(|| i - 1);
+                let after = (index < n).then_some(i);
+                // Rest rotation over half an element: half that of the joint here, or of the nearest joint at an end.
+                let joint = if n < 2 { None } else { Some((rod.first + index.clamp(1, n - 1)) as usize) };
+                if let Some(j) = joint {
+                    rest_half = crate::math::half(self.model.rest_half[j]);
+                }
+                let q = crate::step::clamp_orientation(before.map(|e| state.orientation[e]), after.map(|e| state.orientation[e]), rest_half);
+                (state.position[i], q, state.velocity[i], state.angular_velocity[after.or(before).unwrap_or(i)])
+            }
+            Hold::Jaw => {
+                let (a, b, q) = (state.position[i], state.position[i + 1], state.orientation[i]);
+                half_span = q.conjugate() * ((b - a) * 0.5);
+                ((a + b) * 0.5, q, (state.velocity[i] + state.velocity[i + 1]) * 0.5, state.angular_velocity[i])
+            }
+        };
+        let pose = Pose::new(position, orientation);
+        Ok(self.state.grips.insert(GripState {
+            rod: spec.rod.index,
+            index,
+            hold: spec.hold,
+            drive: spec.drive,
+            ramp: spec.ramp,
+            taken_at: self.state.time,
+            taken_pose: pose,
+            taken_velocity: velocity,
+            taken_spin: spin,
+            pose,
+            target: pose,
+            rest_half,
+            half_span,
+            force: DVec3::ZERO,
+            torque: DVec3::ZERO,
+        }))
     }
+
     /// Lets go.
     pub fn remove_grip(&mut self, grip: Handle<Grip>) -> Result<(), Error> {
-        unimplemented!()
+        self.state.grips.remove(grip).map(|_| ()).ok_or(GRIP)
     }
+
     /// Pose wanted at the end of the next step for a pose-driven grip. A pin ignores the orientation. The orientation of a clamp or
     /// jaw is that of the material frame held (`world_from_material`).
     pub fn set_grip_pose(&mut self, grip: Handle<Grip>, pose: Pose) -> Result<(), Error> {
-        unimplemented!()
+        let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
+        if !pose.is_valid() {
+            return Err(Error::invalid("grip", "pose", pose, "finite, with a unit quaternion"));
+        }
+        if g.drive != Drive::Pose {
+            return Err(Error::invalid("grip", "drive", g.drive, "Pose, for a pose to be set"));
+        }
+        g.target = pose;
+        Ok(())
     }
+
     /// Changes what moves a grip, from the next step on. To `Drive::Pose`: it stays where it is until a pose is set.
     pub fn set_grip_drive(&mut self, grip: Handle<Grip>, drive: Drive) -> Result<(), Error> {
-        unimplemented!()
+        drive.validate()?;
+        let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
+        g.drive = drive;
+        g.target = g.pose;
+        Ok(())
     }
-    /// Pose of the held piece now.
+
+    /// Pose of the held piece now. For a pin the orientation is the identity.
     pub fn grip_pose(&self, grip: Handle<Grip>) -> Result<Pose, Error> {
-        unimplemented!()
+        let g = self.state.grips.get(grip).ok_or(GRIP)?;
+        let rod = self.model.rods.at(g.rod).ok_or(ROD)?;
+        let i = (rod.first + g.index) as usize;
+        let x = &self.state.position;
+        Ok(match g.hold {
+            Hold::Pin => Pose::at(x[i]),
+            Hold::Clamp => Pose::new(x[i], g.pose.orientation),
+            Hold::Jaw => Pose::new((x[i] + x[i + 1]) * 0.5, self.state.orientation[i]),
+        })
     }
+
     /// Force and torque with which the grip acts on the thread, at the last accepted substep.
     pub fn grip_wrench(&self, grip: Handle<Grip>) -> Result<Wrench, Error> {
-        unimplemented!()
+        let g = self.state.grips.get(grip).ok_or(GRIP)?;
+        Ok(Wrench { force: g.force, torque: g.torque })
     }
+
     /// Adds a load.
     pub fn insert_load(&mut self, spec: &LoadSpec) -> Result<Handle<Load>, Error> {
-        unimplemented!()
+        let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
+        self.validate_load(&spec.kind, rod)?;
+        let handle = self.state.loads.insert(LoadState { rod: spec.rod.index, kind: spec.kind });
+        self.refresh_masses();
+        Ok(handle)
     }
+
     /// Changes a load.
     pub fn set_load(&mut self, load: Handle<Load>, kind: LoadKind) -> Result<(), Error> {
-        unimplemented!()
+        let rod = self.state.loads.get(load).ok_or(LOAD)?.rod;
+        self.validate_load(&kind, self.model.rods.at(rod).ok_or(ROD)?)?;
+        if let Some(l) = self.state.loads.get_mut(load) {
+            l.kind = kind;
+        }
+        self.refresh_masses();
+        Ok(())
     }
+
     /// Removes a load.
     pub fn remove_load(&mut self, load: Handle<Load>) -> Result<(), Error> {
-        unimplemented!()
+        self.state.loads.remove(load).ok_or(LOAD)?;
+        self.refresh_masses();
+        Ok(())
     }
+
+    fn validate_load(&self, kind: &LoadKind, rod: &RodModel) -> Result<(), Error> {
+        kind.validate()?;
+        match kind {
+            LoadKind::Point { place, .. } | LoadKind::Mass { place, .. } => place.validate("load", &self.model, rod),
+            LoadKind::Uniform { .. } => Ok(()),
+        }
+    }
+
+    /// Lumped masses and spin inertias: half of each element at its ends, and what is attached.
+    fn refresh_masses(&mut self) {
+        let model = &mut self.model;
+        model.mass.fill(0.0);
+        model.inertia.fill(DVec3::ZERO);
+        for (_, rod) in model.rods.iter() {
+            for e in rod.elements() {
+                let l = model.rest_length[e];
+                let half = 0.5 * rod.section.mass * l;
+                model.mass[e] += half;
+                model.mass[e + 1] += half;
+                let i = rod.section.inertia * l;
+                model.inertia[e] = DVec3::new(i, i, 2.0 * i);
+            }
+        }
+        for (_, load) in self.state.loads.iter() {
+            if let LoadKind::Mass { place, mass, inertia } = load.kind {
+                let rod = self.model.rods.at(load.rod).expect("loads go with their rod");
+                let (e, s) = place.on_element(&self.model, rod);
+                self.model.mass[e] += mass * (1.0 - s);
+                self.model.mass[e + 1] += mass * s;
+                self.model.inertia[e] += inertia;
+            }
+        }
+    }
+
     /// Force with which threads act on a shape, at the last accepted substep, torque about its origin.
     pub fn shape_wrench(&self, shape: Handle<Shape>) -> Result<Wrench, Error> {
-        unimplemented!()
+        self.model.shapes.get(shape).ok_or(SHAPE)?;
+        let origin = self.state.shape_pose[shape.index()].position;
+        let mut sum = Wrench::default();
+        for c in self.state.shape_contacts.iter().filter(|c| c.shape == shape.index) {
+            let e = c.element as usize;
+            let x = self.state.position[e].lerp(self.state.position[e + 1], c.s);
+            let surface = x - c.normal * self.radius_of(e);
+            let force = -(c.normal * c.normal_force + c.friction);
+            sum.force += force;
+            sum.torque += (surface - origin).cross(force);
+        }
+        Ok(sum)
     }
+
+    fn radius_of(&self, e: usize) -> f64 {
+        self.model.rods.at(self.model.rod_of[e]).map_or(0.0, |r| r.radius)
+    }
+
     /// Reads a thread.
     pub fn rod(&self, rod: Handle<Rod>) -> Result<RodView<'_>, Error> {
-        unimplemented!()
+        self.model.rods.get(rod).ok_or(ROD)?;
+        self.view().rod_at(rod.index).ok_or(ROD)
     }
     /// Reads a shape.
     pub fn shape(&self, shape: Handle<Shape>) -> Result<ShapeView<'_>, Error> {
-        unimplemented!()
+        let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
+        Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], slot: shape.index() })
     }
     /// Reads everything.
     pub fn view(&self) -> View<'_> {
         View { model: &self.model, state: &self.state }
     }
+
     /// Contacts that carry force, at the last accepted substep.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + '_ {
-        core::iter::empty()
+        let place = |e: u32| {
+            let slot = self.model.rod_of[e as usize];
+            (slot as usize, (e - self.model.rods.at(slot).map_or(0, |r| r.first)) as usize)
+        };
+        let point = |e: u32, s: f64| self.state.position[e as usize].lerp(self.state.position[e as usize + 1], s);
+        let threads = self.state.thread_contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| {
+            let (rod, element) = place(c.b);
+            ContactView {
+                a: place(c.a),
+                b: ContactWith::Thread(rod, element, c.t),
+                s: c.s,
+                point: point(c.a, c.s),
+                normal: c.normal,
+                force: c.normal * c.normal_force + c.friction,
+            }
+        });
+        let shapes = self.state.shape_contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| ContactView {
+            a: place(c.element),
+            b: ContactWith::Shape(c.shape as usize),
+            s: c.s,
+            point: point(c.element, c.s),
+            normal: c.normal,
+            force: c.normal * c.normal_force + c.friction,
+        });
+        threads.chain(shapes)
     }
+
     /// Simulated time \[s\].
     pub fn time(&self) -> f64 {
         self.state.time
     }
+
     /// Advances by `dt` \[s\], cut into substeps. Never fails: see the report.
     pub fn step(&mut self, dt: f64) -> StepReport {
         self.step_with(dt, &mut |_| {})
     }
+
     /// The same; `observe` sees every accepted substep (an audit, a recorder).
     pub fn step_with(&mut self, dt: f64, observe: &mut dyn FnMut(View<'_>)) -> StepReport {
-        unimplemented!()
+        let start = self.state.time;
+        let mut report = StepReport { time: start, ..StepReport::default() };
+        if !(dt.is_finite() && dt > 0.0) {
+            report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is not a finite number > 0" } });
+            return report;
+        }
+        self.report_teleports(dt, &mut report);
+        let mut interval = crate::step::Interval { start, length: dt, observe };
+        crate::step::step(&self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
+        report.time = self.state.time;
+        report.contacts = self.contacts().count() as u32;
+        report.length_error = self.length_error();
+        report
     }
+
+    /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
+    fn report_teleports(&self, dt: f64, report: &mut StepReport) {
+        const FASTEST: f64 = 100.0;
+        let grips = self.state.grips.iter().map(|(_, g)| (g.target.position - g.pose.position).length());
+        let shapes = self.model.shapes.iter().map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
+        for distance in grips.chain(shapes).filter(|d| *d > FASTEST * dt) {
+            report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
+        }
+    }
+
+    fn length_error(&self) -> f64 {
+        let mut worst = 0.0f64;
+        for (_, rod) in self.model.rods.iter() {
+            for e in rod.elements() {
+                let strain = (self.state.position[e + 1] - self.state.position[e]).length() / self.model.rest_length[e] - 1.0;
+                let want = if self.model.inextensible[e] { 0.0 } else { self.state.tension[e] / rod.section.ea };
+                worst = worst.max((strain - want).abs());
+            }
+        }
+        worst
+    }
+
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
     pub fn snapshot(&self) -> Vec<u8> {
-        unimplemented!()
+        crate::snapshot::write(&self.state)
     }
-    /// Takes the world back to a snapshot of a world with the same model.
+
+    /// Takes the world back to a snapshot of a world with the same model. On error nothing is changed.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        unimplemented!()
+        let state = crate::snapshot::read(bytes)?;
+        self.check_fit(&state).map_err(|reason| Error::Snapshot { reason: reason.into() })?;
+        self.state = state;
+        self.refresh_masses();
+        Ok(())
     }
+
+    /// Whether a state read from outside belongs to this model and is usable.
+    fn check_fit(&self, s: &State) -> Result<(), &'static str> {
+        let n = self.model.mass.len();
+        let lengths = [s.position.len(), s.velocity.len(), s.orientation.len(), s.angular_velocity.len(), s.tension.len(), s.plastic.len(), s.hardened.len()];
+        if lengths.iter().any(|l| *l != n) {
+            return Err("it is of a world with other threads");
+        }
+        if s.shape_pose.len() != self.model.shapes.len() || s.shape_target.len() != s.shape_pose.len() {
+            return Err("it is of a world with other shapes");
+        }
+        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.plastic);
+        let finite = vectors.into_iter().all(|v| v.is_finite())
+            && s.orientation.iter().all(|q| (q.length() - 1.0).abs() < 1e-6)
+            && s.tension.iter().chain(&s.hardened).all(|v| v.is_finite())
+            && s.shape_pose.iter().chain(&s.shape_target).all(Pose::is_valid)
+            && s.time.is_finite()
+            && s.last_h.is_finite();
+        if !finite {
+            return Err("a number in it is not finite or a quaternion is not of unit length");
+        }
+        for (_, g) in s.grips.iter() {
+            let rod = self.model.rods.at(g.rod).ok_or("a grip holds a thread that is not here")?;
+            let last = if g.hold == Hold::Jaw { rod.n_elements - 1 } else { rod.n_elements };
+            let poses = g.pose.is_valid() && g.target.is_valid() && g.taken_pose.is_valid() && g.rest_half.is_normalized();
+            if g.index > last || g.drive.validate().is_err() || !poses || !g.half_span.is_finite() {
+                return Err("a grip is out of range");
+            }
+        }
+        for (_, l) in s.loads.iter() {
+            let rod = self.model.rods.at(l.rod).ok_or("a load is on a thread that is not here")?;
+            if self.validate_load(&l.kind, rod).is_err() {
+                return Err("a load is out of range");
+            }
+        }
+        let element = |e: u32| (e as usize) < n && self.model.is_element(e as usize);
+        let threads = s.thread_contacts.iter().all(|c| element(c.a) && element(c.b) && c.a < c.b && c.normal.is_finite() && c.friction.is_finite() && c.normal_force.is_finite());
+        let shapes = s.shape_contacts.iter().all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && c.normal.is_finite() && c.friction.is_finite());
+        if !(threads && shapes) {
+            return Err("a contact is out of range");
+        }
+        Ok(())
+    }
+
     /// 64-bit hash of the state; equal bits, equal hash, on any machine.
     pub fn state_hash(&self) -> u64 {
-        unimplemented!()
+        crate::snapshot::hash(&self.state)
     }
+
+    #[cfg(test)]
+    pub(crate) fn into_parts(self) -> (Model, State) {
+        (self.model, self.state)
+    }
+
+    /// Drops the working memory. Nothing that follows changes by a bit; the next step allocates again.
+    pub fn forget_scratch(&mut self) {
+        self.scratch = Scratch::default();
+    }
+}
+
+/// Whether a grip and a new hold at `index` share a particle.
+fn nodes_overlap(grip: &GripState, hold: Hold, index: u32) -> bool {
+    let range = |hold: Hold, i: u32| if hold == Hold::Jaw { i..=i + 1 } else { i..=i };
+    let (a, b) = (range(grip.hold, grip.index), range(hold, index));
+    a.start() <= b.end() && b.start() <= a.end()
 }

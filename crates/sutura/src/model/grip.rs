@@ -2,7 +2,8 @@
 
 use crate::error::{Error, check};
 use crate::handle::Handle;
-use crate::model::rod::Rod;
+use crate::model::Model;
+use crate::model::rod::{Rod, RodModel};
 use glam::DVec3;
 
 /// A grip. Marker of [`Handle`](crate::Handle).
@@ -148,6 +149,49 @@ impl LoadKind {
                 check("load", "mass", *mass, *mass >= 0.0, "a finite mass >= 0 [kg]")?;
                 check("load", "inertia", inertia.min_element(), inertia.is_finite() && inertia.min_element() >= 0.0, "finite moments >= 0 [kg m^2]")
             }
+        }
+    }
+}
+
+impl Place {
+    /// Element (index in the world's arrays) and position on it, 0 to 1.
+    pub(crate) fn on_element(&self, model: &Model, rod: &RodModel) -> (usize, f64) {
+        let (first, n) = (rod.first as usize, rod.n_elements as usize);
+        match *self {
+            Place::Start => (first, 0.0),
+            Place::End => (first + n - 1, 1.0),
+            Place::Particle(i) if i as usize >= n => (first + n - 1, 1.0),
+            Place::Particle(i) => (first + i as usize, 0.0),
+            Place::Element(e) => (first + (e as usize).min(n - 1), 0.5),
+            Place::Arc(s) => {
+                let mut left = s.max(0.0);
+                for e in rod.elements() {
+                    let l = model.rest_length[e];
+                    if left <= l {
+                        return (e, left / l);
+                    }
+                    left -= l;
+                }
+                (first + n - 1, 1.0)
+            }
+        }
+    }
+    /// Particle counted from the rod's start.
+    pub(crate) fn particle(&self, model: &Model, rod: &RodModel) -> u32 {
+        let (e, s) = self.on_element(model, rod);
+        (e - rod.first as usize) as u32 + u32::from(s > 0.5)
+    }
+    pub(crate) fn validate(&self, what: &'static str, model: &Model, rod: &RodModel) -> Result<(), Error> {
+        match *self {
+            Place::Start | Place::End => Ok(()),
+            Place::Particle(i) if i <= rod.n_elements => Ok(()),
+            Place::Element(e) if e < rod.n_elements => Ok(()),
+            Place::Arc(s) => {
+                let length: f64 = rod.elements().map(|e| model.rest_length[e]).sum();
+                check(what, "place.arc", s, s >= 0.0 && s <= length * (1.0 + 1e-9), "a rest arc length within the thread [m]")
+            }
+            Place::Particle(i) => Err(Error::invalid(what, "place.particle", i, "at most the number of elements")),
+            Place::Element(e) => Err(Error::invalid(what, "place.element", e, "under the number of elements")),
         }
     }
 }

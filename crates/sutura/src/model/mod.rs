@@ -6,13 +6,13 @@ pub mod rod;
 pub mod shape;
 
 use crate::handle::Slots;
-use crate::math::Pose;
 use crate::params::{Friction, Settings};
 use glam::{DQuat, DVec3};
 use rod::RodModel;
 use shape::{Geometry, ShapeMotion};
 
-/// All rods lie one after the other in these arrays: particle arrays have `n + 1` entries a rod, frame arrays `n`.
+/// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last element entry
+/// of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
 #[derive(Default)]
 pub struct Model {
     pub(crate) settings: Settings,
@@ -23,19 +23,25 @@ pub struct Model {
 
     /// Mass of each particle, attached masses included \[kg\].
     pub(crate) mass: Vec<f64>,
-    /// Slot of the rod of each particle.
-    pub(crate) particle_rod: Vec<u32>,
+    /// Slot of the rod of each particle and element.
+    pub(crate) rod_of: Vec<u32>,
 
     /// Rest length of each element \[m\].
     pub(crate) rest_length: Vec<f64>,
     /// Moments of inertia of each frame along its directors, attached ones included \[kg m^2\].
     pub(crate) inertia: Vec<DVec3>,
-    /// Slot of the rod of each element.
-    pub(crate) element_rod: Vec<u32>,
-    /// Rest length between the middles of elements `f - 1` and `f` \[m\]; zero at the first element of a rod (no joint).
+    /// Rest length between the middles of elements `e - 1` and `e` \[m\]; zero at the first element of a rod (no joint).
     pub(crate) joint_length: Vec<f64>,
-    /// Square root of the rest rotation of the joint between `f - 1` and `f`.
+    /// Square root of the rest rotation of the joint between `e - 1` and `e`.
     pub(crate) rest_half: Vec<DQuat>,
+    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; for inextensible rods that of the multiplier's penalty) \[N/m\].
+    pub(crate) stretch_stiffness: Vec<DVec3>,
+    /// Whether the length of each element is a constraint.
+    pub(crate) inextensible: Vec<bool>,
+    /// Stiffness of each joint in bending about d1, d2 and twist about d3 \[N m/rad\].
+    pub(crate) bend_stiffness: Vec<DVec3>,
+    /// Relaxation time of Kelvin-Voigt damping of each joint \[s\].
+    pub(crate) bend_damping: Vec<f64>,
 }
 
 /// A shape, checked and ready for queries.
@@ -44,8 +50,6 @@ pub(crate) struct ShapeModel {
     pub collider: crate::collide::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,
-    /// Pose at insertion.
-    pub pose: Pose,
 }
 
 impl Model {
@@ -57,9 +61,12 @@ impl Model {
             Err(_) => self.settings.friction,
         }
     }
-    /// First particle of element `f`: rods before it have one particle more than elements.
-    pub(crate) fn particle_of(&self, f: usize) -> usize {
-        let rod = self.rods.at(self.element_rod[f]).expect("element of a living rod");
-        f - rod.first_frame as usize + rod.first_particle as usize
+    /// Whether `e` is an element (and not the unused last entry of a rod).
+    pub(crate) fn is_element(&self, e: usize) -> bool {
+        self.rest_length[e] > 0.0
+    }
+    /// Whether there is a joint between elements `e - 1` and `e`.
+    pub(crate) fn is_joint(&self, e: usize) -> bool {
+        self.joint_length[e] > 0.0
     }
 }

@@ -103,10 +103,8 @@ pub fn transported_frames(points: &[DVec3], hint: DVec3) -> Vec<DQuat> {
 /// A rod as the solver reads it. Elements and joints are slices of the world's arrays.
 #[derive(Debug, Clone)]
 pub(crate) struct RodModel {
-    /// Index of the first particle in the world's particle arrays.
-    pub first_particle: u32,
-    /// Index of the first frame (element) in the world's frame arrays.
-    pub first_frame: u32,
+    /// Index of the first particle and element in the world's arrays.
+    pub first: u32,
     pub n_elements: u32,
     pub radius: f64,
     pub section: Section,
@@ -119,10 +117,10 @@ pub(crate) struct RodModel {
 
 impl RodModel {
     pub fn particles(&self) -> core::ops::Range<usize> {
-        self.first_particle as usize..(self.first_particle + self.n_elements + 1) as usize
+        self.first as usize..(self.first + self.n_elements + 1) as usize
     }
-    pub fn frames(&self) -> core::ops::Range<usize> {
-        self.first_frame as usize..(self.first_frame + self.n_elements) as usize
+    pub fn elements(&self) -> core::ops::Range<usize> {
+        self.first as usize..(self.first + self.n_elements) as usize
     }
 }
 

@@ -1,15 +1,55 @@
-//! The Cosserat rod.
+//! The discrete Cosserat rod: strains, their linear system, and read-outs.
+
+pub(crate) mod factor;
+pub(crate) mod strain;
+
 use crate::model::{Model, rod::RodModel};
 use crate::state::State;
 use crate::view::Energy;
 use glam::DVec3;
 
-pub(crate) fn internal_force(_m: &Model, _s: &State, _r: &RodModel, _f: usize) -> DVec3 {
-    unimplemented!()
+/// Stretch and shear of element `e` along its directors \[m\].
+#[inline]
+pub(crate) fn element_strain(model: &Model, state: &State, e: usize) -> DVec3 {
+    let d = state.position[e + 1] - state.position[e];
+    state.orientation[e].conjugate() * d - DVec3::new(0.0, 0.0, model.rest_length[e])
 }
-pub(crate) fn joint_angle(_m: &Model, _s: &State, _f: usize) -> DVec3 {
-    unimplemented!()
+
+/// Force carried by element `e` along its directors \[N\].
+pub(crate) fn internal_force(model: &Model, state: &State, rod: &RodModel, e: usize) -> DVec3 {
+    let mut f = element_strain(model, state, e) * model.stretch_stiffness[e];
+    if rod.stretch == crate::Stretch::Inextensible {
+        f.z = state.tension[e];
+    }
+    f
 }
-pub(crate) fn energy(_m: &Model, _s: &State, _r: &RodModel) -> Energy {
-    unimplemented!()
+
+/// Elastic bend and twist of the joint before element `e` \[rad\].
+pub(crate) fn joint_angle(model: &Model, state: &State, e: usize) -> DVec3 {
+    strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]) - state.plastic[e]
+}
+
+/// Mechanical energy of a rod.
+pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
+    let mut sum = Energy::default();
+    for i in rod.particles() {
+        sum.kinetic += 0.5 * model.mass[i] * state.velocity[i].length_squared();
+        sum.gravity -= model.mass[i] * model.settings.gravity.dot(state.position[i]);
+    }
+    for e in rod.elements() {
+        let w = state.orientation[e].conjugate() * state.angular_velocity[e];
+        sum.kinetic += 0.5 * (model.inertia[e] * w).dot(w);
+        let c = element_strain(model, state, e);
+        let mut k = model.stretch_stiffness[e];
+        if rod.stretch == crate::Stretch::Inextensible {
+            k.z = 0.0;
+        }
+        sum.stretch += 0.5 * (k * c).dot(c);
+        if model.is_joint(e) {
+            let (a, b) = (joint_angle(model, state, e), model.bend_stiffness[e]);
+            sum.bend += 0.5 * (b.x * a.x * a.x + b.y * a.y * a.y);
+            sum.twist += 0.5 * b.z * a.z * a.z;
+        }
+    }
+    sum
 }

@@ -54,9 +54,10 @@ pub(crate) struct GripState {
     /// Pose commanded for the end of the last step and of the next one.
     pub pose: Pose,
     pub target: Pose,
-    /// For a clamp: rotation from the commanded orientation to the frames before and after the particle, at rest.
-    pub clamp_before: DQuat,
-    pub clamp_after: DQuat,
+    /// For a clamp: square root of the rest rotation over half an element, between the clamp and the frames beside it.
+    pub rest_half: DQuat,
+    /// For a jaw: from the middle of the element to its second particle, in the frame of the grip \[m\].
+    pub half_span: DVec3,
     /// Force and torque on the thread at the last accepted substep \[N\], \[N m\].
     pub force: DVec3,
     pub torque: DVec3,
@@ -82,6 +83,8 @@ pub(crate) struct ThreadContact {
     /// Normal force \[N\] and friction force on a \[N\].
     pub normal_force: f64,
     pub friction: DVec3,
+    /// Whether it slid.
+    pub sliding: bool,
 }
 
 /// A thread-shape contact that the next substep starts from.
@@ -93,4 +96,44 @@ pub(crate) struct ShapeContact {
     pub normal: DVec3,
     pub normal_force: f64,
     pub friction: DVec3,
+    /// Whether it slid.
+    pub sliding: bool,
+}
+
+impl State {
+    /// A copy into memory that is already there.
+    pub(crate) fn copy_from(&mut self, from: &State) {
+        let State {
+            time,
+            last_h,
+            position,
+            velocity,
+            orientation,
+            angular_velocity,
+            tension,
+            plastic,
+            hardened,
+            shape_pose,
+            shape_target,
+            grips,
+            loads,
+            thread_contacts,
+            shape_contacts,
+        } = from;
+        self.time = *time;
+        self.last_h = *last_h;
+        self.position.clone_from(position);
+        self.velocity.clone_from(velocity);
+        self.orientation.clone_from(orientation);
+        self.angular_velocity.clone_from(angular_velocity);
+        self.tension.clone_from(tension);
+        self.plastic.clone_from(plastic);
+        self.hardened.clone_from(hardened);
+        self.shape_pose.clone_from(shape_pose);
+        self.shape_target.clone_from(shape_target);
+        self.grips.copy_from(grips);
+        self.loads.copy_from(loads);
+        self.thread_contacts.clone_from(thread_contacts);
+        self.shape_contacts.clone_from(shape_contacts);
+    }
 }

@@ -1,0 +1,397 @@
+//! The linear system of a rod and its direct solution.
+//!
+//! The unknowns of a rod, ordered x_0, theta_0, x_1, theta_1, ... in nodes of three, couple each node to the next two only:
+//! x_i to theta_i and x_{i+1}, theta_i to x_{i+1} and theta_{i+1}. The matrix is symmetric positive definite and block
+//! pentadiagonal with 3x3 blocks. It is factored as L D L^T without square roots, each 3x3 pivot as l d l^T (a pivot's closed-form
+//! inverse would lose all digits: stretch is 1e8 times stiffer than the rest).
+//!
+//! Elimination runs from both ends of a rod toward a zone of blocks `[lo, hi]` (a block is x_i with theta_i) and then through the
+//! zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone alone.
+
+use core::ops::Range;
+use glam::{DMat3, DVec3};
+
+/// One pivot `l d l^T` with unit lower triangular `l`.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pivot {
+    l10: f64,
+    l20: f64,
+    l21: f64,
+    /// Reciprocals of d.
+    inv: DVec3,
+}
+
+impl Pivot {
+    #[inline(always)]
+    fn new(a: &DMat3) -> Self {
+        let d0 = a.x_axis.x;
+        let i0 = 1.0 / d0;
+        let l10 = a.x_axis.y * i0;
+        let l20 = a.x_axis.z * i0;
+        let d1 = a.y_axis.y - l10 * a.x_axis.y;
+        let i1 = 1.0 / d1;
+        let c21 = a.y_axis.z - l20 * a.x_axis.y;
+        let l21 = c21 * i1;
+        let d2 = a.z_axis.z - l20 * a.x_axis.z - l21 * c21;
+        Pivot { l10, l20, l21, inv: DVec3::new(i0, i1, 1.0 / d2) }
+    }
+    /// `l^-1 v`.
+    #[inline(always)]
+    fn lower(&self, v: DVec3) -> DVec3 {
+        let y = v.y - self.l10 * v.x;
+        DVec3::new(v.x, y, v.z - self.l20 * v.x - self.l21 * y)
+    }
+    /// `l^-T v`.
+    #[inline(always)]
+    fn upper(&self, v: DVec3) -> DVec3 {
+        let y = v.y - self.l21 * v.z;
+        DVec3::new(v.x - self.l10 * y - self.l20 * v.z, y, v.z)
+    }
+    #[inline(always)]
+    fn lower_mat(&self, m: &DMat3) -> DMat3 {
+        DMat3::from_cols(self.lower(m.x_axis), self.lower(m.y_axis), self.lower(m.z_axis))
+    }
+    #[inline(always)]
+    fn upper_mat(&self, m: &DMat3) -> DMat3 {
+        DMat3::from_cols(self.upper(m.x_axis), self.upper(m.y_axis), self.upper(m.z_axis))
+    }
+    /// The inverse of the pivot times `m`.
+    #[inline(always)]
+    fn solve_mat(&self, m: &DMat3) -> DMat3 {
+        self.upper_mat(&scale_rows(&self.lower_mat(m), self.inv))
+    }
+}
+
+#[inline(always)]
+fn scale_rows(m: &DMat3, s: DVec3) -> DMat3 {
+    DMat3::from_cols(m.x_axis * s, m.y_axis * s, m.z_axis * s)
+}
+
+/// `a^T b`.
+#[inline(always)]
+fn t_mul(a: &DMat3, b: &DMat3) -> DMat3 {
+    let col = |v: DVec3| DVec3::new(a.x_axis.dot(v), a.y_axis.dot(v), a.z_axis.dot(v));
+    DMat3::from_cols(col(b.x_axis), col(b.y_axis), col(b.z_axis))
+}
+
+/// A 6x6 matrix in four 3x3 blocks: rows and columns are (x, theta).
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Block {
+    pub xx: DMat3,
+    pub xt: DMat3,
+    pub tx: DMat3,
+    pub tt: DMat3,
+}
+
+/// Three columns of six numbers: (x, theta) parts.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Columns {
+    pub x: DMat3,
+    pub t: DMat3,
+}
+
+impl Block {
+    #[inline(always)]
+    pub fn mul_columns(&self, c: &Columns) -> Columns {
+        Columns { x: self.xx * c.x + self.xt * c.t, t: self.tx * c.x + self.tt * c.t }
+    }
+    #[inline(always)]
+    fn mul(&self, b: &Block) -> Block {
+        Block {
+            xx: self.xx * b.xx + self.xt * b.tx,
+            xt: self.xx * b.xt + self.xt * b.tt,
+            tx: self.tx * b.xx + self.tt * b.tx,
+            tt: self.tx * b.xt + self.tt * b.tt,
+        }
+    }
+    #[inline(always)]
+    fn transpose(&self) -> Block {
+        Block { xx: self.xx.transpose(), xt: self.tx.transpose(), tx: self.xt.transpose(), tt: self.tt.transpose() }
+    }
+    fn add(&self, b: &Block) -> Block {
+        Block { xx: self.xx + b.xx, xt: self.xt + b.xt, tx: self.tx + b.tx, tt: self.tt + b.tt }
+    }
+}
+
+impl Columns {
+    #[inline(always)]
+    pub fn add(&self, o: &Columns) -> Columns {
+        Columns { x: self.x + o.x, t: self.t + o.t }
+    }
+}
+
+/// The system of all rods. Node `2 i` is particle i, node `2 i + 1` frame i. Assembled, then factored in place.
+#[derive(Default)]
+pub(crate) struct System {
+    pub diagonal: Vec<DMat3>,
+    /// Coupling of each node to the next one and to the one after it: `a[k][k + 1]`, `a[k][k + 2]`.
+    pub next: Vec<DMat3>,
+    pub after: Vec<DMat3>,
+    pivots: Vec<Pivot>,
+    /// Inverse of the matrix at zone blocks, and transfer `z_i = -k_i z_{i+1}` between them.
+    inverse: Vec<Block>,
+    transfer: Vec<Block>,
+}
+
+impl System {
+    pub fn resize(&mut self, n_particles: usize) {
+        let n = 2 * n_particles;
+        self.diagonal.resize(n, DMat3::ZERO);
+        self.next.resize(n, DMat3::ZERO);
+        self.after.resize(n, DMat3::ZERO);
+        self.pivots.resize(n, Pivot::default());
+        self.inverse.resize(n_particles, Block::default());
+        self.transfer.resize(n_particles, Block::default());
+    }
+
+    /// Takes a node out of the system: its unknown becomes zero times `1 - keep`, where `keep` projects on the free directions.
+    pub fn restrict(&mut self, node: usize, keep: DMat3) {
+        self.diagonal[node] = keep * self.diagonal[node] * keep + (DMat3::IDENTITY - keep);
+        self.next[node] = keep * self.next[node];
+        self.after[node] = keep * self.after[node];
+        if node >= 1 {
+            self.next[node - 1] *= keep;
+        }
+        if node >= 2 {
+            self.after[node - 2] *= keep;
+        }
+    }
+
+    /// Factors the rod whose blocks are `blocks`; the zone must lie within. False when the matrix is not positive definite.
+    pub fn factor(&mut self, blocks: Range<usize>, zone: &Range<usize>) -> bool {
+        for k in 2 * blocks.start..2 * zone.start {
+            self.eliminate_up(k);
+        }
+        for k in (2 * zone.end..2 * blocks.end).rev() {
+            self.eliminate_down(k);
+        }
+        for k in 2 * zone.start..2 * zone.end - 2 {
+            self.eliminate_up(k);
+        }
+        // The last block of the zone has no coupling left beyond itself.
+        let k = 2 * zone.end - 2;
+        let p = Pivot::new(&self.diagonal[k]);
+        let w1 = p.lower_mat(&self.next[k]);
+        self.diagonal[k + 1] -= t_mul(&w1, &scale_rows(&w1, p.inv));
+        self.next[k] = w1;
+        self.pivots[k] = p;
+        self.pivots[k + 1] = Pivot::new(&self.diagonal[k + 1]);
+        self.pivots[2 * blocks.start..2 * blocks.end].iter().all(|p| p.inv.min_element() > 0.0)
+    }
+
+    /// Eliminates node `k` toward higher nodes.
+    #[inline(always)]
+    fn eliminate_up(&mut self, k: usize) {
+        let p = Pivot::new(&self.diagonal[k]);
+        let w1 = p.lower_mat(&self.next[k]);
+        let w2 = p.lower_mat(&self.after[k]);
+        let (s1, s2) = (scale_rows(&w1, p.inv), scale_rows(&w2, p.inv));
+        self.diagonal[k + 1] -= t_mul(&w1, &s1);
+        self.next[k + 1] -= t_mul(&w1, &s2);
+        self.diagonal[k + 2] -= t_mul(&w2, &s2);
+        self.next[k] = w1;
+        self.after[k] = w2;
+        self.pivots[k] = p;
+    }
+
+    /// Eliminates node `k` toward lower nodes. The scaled couplings replace `next[k - 1]` and `after[k - 2]`, transposed.
+    #[inline(always)]
+    fn eliminate_down(&mut self, k: usize) {
+        let p = Pivot::new(&self.diagonal[k]);
+        let w1 = p.lower_mat(&self.next[k - 1].transpose());
+        let w2 = p.lower_mat(&self.after[k - 2].transpose());
+        let (s1, s2) = (scale_rows(&w1, p.inv), scale_rows(&w2, p.inv));
+        self.diagonal[k - 1] -= t_mul(&w1, &s1);
+        self.next[k - 2] -= t_mul(&w2, &s1);
+        self.diagonal[k - 2] -= t_mul(&w2, &s2);
+        self.next[k - 1] = w1;
+        self.after[k - 2] = w2;
+        self.pivots[k] = p;
+    }
+
+    /// Solves for one right side of the rod, in place. `factor` must have run with the same ranges.
+    pub fn solve(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3]) {
+        let (first, last) = (2 * blocks.start, 2 * blocks.end);
+        let (lo, hi) = (2 * zone.start, 2 * zone.end);
+        // Forward: y = l^-1 r, then what it leaves in the nodes it couples to.
+        for k in first..hi - 2 {
+            if k == lo {
+                self.forward_down(hi..last, z);
+            }
+            let p = &self.pivots[k];
+            let y = p.lower(z[k]);
+            z[k] = y * p.inv;
+            let s = z[k];
+            z[k + 1] -= t_vec(&self.next[k], s);
+            z[k + 2] -= t_vec(&self.after[k], s);
+        }
+        if lo >= hi - 2 {
+            self.forward_down(hi..last, z);
+        }
+        let k = hi - 2;
+        let p = &self.pivots[k];
+        z[k] = p.lower(z[k]) * p.inv;
+        let s = z[k];
+        z[k + 1] -= t_vec(&self.next[k], s);
+        let q = &self.pivots[k + 1];
+        z[k + 1] = q.upper(q.lower(z[k + 1]) * q.inv);
+        z[k] = p.upper(z[k] - (self.next[k] * z[k + 1]) * p.inv);
+        for k in (first..hi - 2).rev() {
+            let p = &self.pivots[k];
+            z[k] = p.upper(z[k] - (self.next[k] * z[k + 1] + self.after[k] * z[k + 2]) * p.inv);
+        }
+        for k in hi..last {
+            let p = &self.pivots[k];
+            z[k] = p.upper(z[k] - (self.next[k - 1] * z[k - 1] + self.after[k - 2] * z[k - 2]) * p.inv);
+        }
+    }
+
+    fn forward_down(&self, nodes: Range<usize>, z: &mut [DVec3]) {
+        for k in nodes.rev() {
+            let p = &self.pivots[k];
+            z[k] = p.lower(z[k]) * p.inv;
+            let s = z[k];
+            z[k - 1] -= t_vec(&self.next[k - 1], s);
+            z[k - 2] -= t_vec(&self.after[k - 2], s);
+        }
+    }
+
+    /// Inverse of the matrix at the zone's diagonal blocks, and the transfers between neighboring ones (Takahashi's recursion):
+    /// X_ii = D_i^-1 + K_i X_{i+1,i+1} K_i^T, X_ij = -K_i X_{i+1,j} for i < j.
+    pub fn invert_zone(&mut self, zone: &Range<usize>) {
+        for i in zone.clone().rev() {
+            let (px, pt) = (self.pivots[2 * i], self.pivots[2 * i + 1]);
+            // Inverse of the pivot block [[dx, n], [n^T, dt]]: theta's own pivot is already the Schur complement.
+            let tt = pt.solve_mat(&DMat3::IDENTITY);
+            let n = px.upper_mat(&scale_rows(&self.next[2 * i], px.inv));
+            let xt = -(n * tt);
+            let own = Block { xx: px.solve_mat(&DMat3::IDENTITY) - xt * n.transpose(), xt, tx: xt.transpose(), tt };
+            if i + 1 == zone.end {
+                self.inverse[i] = own;
+                continue;
+            }
+            // theta_i = -(t1 x' + t2 theta'), x_i = -(n theta_i + m x').
+            let t1 = pt.upper_mat(&scale_rows(&self.next[2 * i + 1], pt.inv));
+            let t2 = pt.upper_mat(&scale_rows(&self.after[2 * i + 1], pt.inv));
+            let m = px.upper_mat(&scale_rows(&self.after[2 * i], px.inv));
+            let k = Block { xx: m - n * t1, xt: -(n * t2), tx: t1, tt: t2 };
+            self.inverse[i] = own.add(&k.mul(&self.inverse[i + 1]).mul(&k.transpose()));
+            self.transfer[i] = k;
+        }
+    }
+
+    /// Inverse at zone block `i`.
+    pub fn inverse(&self, i: usize) -> &Block {
+        &self.inverse[i]
+    }
+    /// `k` in `z_i = -k z_{i+1}` for a right side that is zero at and before block `i`.
+    pub fn transfer(&self, i: usize) -> &Block {
+        &self.transfer[i]
+    }
+}
+
+#[inline(always)]
+fn t_vec(a: &DMat3, v: DVec3) -> DVec3 {
+    DVec3::new(a.x_axis.dot(v), a.y_axis.dot(v), a.z_axis.dot(v))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pseudo-random symmetric positive definite system of `n` blocks whose stiffnesses spread over eight decades.
+    fn sample(n: usize) -> System {
+        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
+        let mut rnd = move || {
+            seed ^= seed << 13;
+            seed ^= seed >> 7;
+            seed ^= seed << 17;
+            (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let mut s = System::default();
+        s.resize(n);
+        // A sum of rank-one terms j j^T over three neighboring nodes keeps the pattern and is positive.
+        for k in 0..2 * n {
+            s.diagonal[k] = DMat3::IDENTITY * 1e-3;
+        }
+        for k in 0..2 * n - 2 {
+            for w in [1e5, 1.0, 1e-2, 1e-2, 3.0] {
+                let j: Vec<DVec3> = (0..3).map(|_| DVec3::new(rnd(), rnd(), rnd())).collect();
+                for a in 0..3 {
+                    s.diagonal[k + a] += crate::math::outer(j[a], j[a]) * w;
+                }
+                s.next[k] += crate::math::outer(j[0], j[1]) * w;
+                s.next[k + 1] += crate::math::outer(j[1], j[2]) * w;
+                s.after[k] += crate::math::outer(j[0], j[2]) * w;
+            }
+        }
+        s
+    }
+
+    fn multiply(s: &System, z: &[DVec3]) -> Vec<DVec3> {
+        let n = z.len();
+        (0..n)
+            .map(|k| {
+                let mut y = s.diagonal[k] * z[k];
+                if k + 1 < n {
+                    y += s.next[k] * z[k + 1];
+                }
+                if k + 2 < n {
+                    y += s.after[k] * z[k + 2];
+                }
+                if k >= 1 {
+                    y += s.next[k - 1].transpose() * z[k - 1];
+                }
+                if k >= 2 {
+                    y += s.after[k - 2].transpose() * z[k - 2];
+                }
+                y
+            })
+            .collect()
+    }
+
+    #[test]
+    fn solves_for_every_zone() {
+        let n = 7;
+        for lo in 0..n {
+            for hi in lo + 1..=n {
+                let s = sample(n);
+                let mut f = sample(n);
+                f.factor(0..n, &(lo..hi));
+                let want: Vec<DVec3> = (0..2 * n).map(|k| DVec3::new(k as f64, 1.0, -0.5 * k as f64)).collect();
+                let mut z = multiply(&s, &want);
+                f.solve(0..n, &(lo..hi), &mut z);
+                let err = z.iter().zip(&want).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+                // Condition about 1e9, so nine digits may go.
+                assert!(err < 1e-6, "zone {lo}..{hi}: {err:e}");
+            }
+        }
+    }
+
+    #[test]
+    fn zone_inverse_is_the_inverse() {
+        let n = 7;
+        let zone = 2..6;
+        let mut f = sample(n);
+        f.factor(0..n, &zone);
+        f.invert_zone(&zone);
+        for j in zone.clone() {
+            for axis in 0..3 {
+                let mut z = vec![DVec3::ZERO; 2 * n];
+                z[2 * j][axis] = 1.0;
+                f.solve(0..n, &zone, &mut z);
+                // Down the column from the diagonal block by transfers.
+                let mut x = f.inverse(j).xx.col(axis);
+                let mut t = f.inverse(j).tx.col(axis);
+                for i in (zone.start..=j).rev() {
+                    if i < j {
+                        let k = f.transfer(i);
+                        (x, t) = (-(k.xx * x + k.xt * t), -(k.tx * x + k.tt * t));
+                    }
+                    let scale = z[2 * i].length().max(z[2 * i + 1].length());
+                    assert!((x - z[2 * i]).length() < 1e-8 * scale && (t - z[2 * i + 1]).length() < 1e-8 * scale, "block {i},{j}");
+                }
+            }
+        }
+    }
+}

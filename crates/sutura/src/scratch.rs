@@ -1,0 +1,105 @@
+//! Working memory of the step. May be dropped between steps without changing one bit of what follows.
+
+use crate::collide::Candidates;
+use crate::rod::factor::System;
+use crate::row::Rows;
+use crate::state::State;
+use core::ops::Range;
+use glam::{DMat3, DQuat, DVec3};
+
+/// What may move at a node of the linear system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Freedom {
+    Free,
+    Held,
+    /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the substep, \[N/m\]).
+    Line { direction: DVec3, force: f64, damper: f64 },
+}
+
+impl Freedom {
+    /// Projector on the directions that stay free.
+    pub fn projector(&self) -> DMat3 {
+        match self {
+            Freedom::Free => DMat3::IDENTITY,
+            Freedom::Held => DMat3::ZERO,
+            Freedom::Line { direction, .. } => crate::math::outer(*direction, *direction),
+        }
+    }
+}
+
+/// A joint between a frame and the fixed cross-section of a clamp.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ClampJoint {
+    pub grip: u32,
+    pub frame: u32,
+    /// The clamp comes before the frame along the rod.
+    pub first: bool,
+    pub orientation: DQuat,
+    pub rest_half: DQuat,
+    pub stiffness: DVec3,
+    pub damping: f64,
+    /// Angle at the start of the substep.
+    pub start: DVec3,
+}
+
+#[derive(Default)]
+pub(crate) struct Scratch {
+    /// States to go back to when a substep is rejected, one per halving depth.
+    pub saved: Vec<State>,
+
+    /// Where the velocity alone would carry positions and orientations.
+    pub target: Vec<DVec3>,
+    pub target_frame: Vec<DQuat>,
+    /// Start of the substep.
+    pub start: Vec<DVec3>,
+    pub start_frame: Vec<DQuat>,
+    /// Joint angles at the start, for Kelvin-Voigt.
+    pub start_angle: Vec<DVec3>,
+    /// Outside force and torque on particles and frames.
+    pub force: Vec<DVec3>,
+    pub torque: Vec<DVec3>,
+
+    /// One per node: particle, frame, particle, ...
+    pub freedom: Vec<Freedom>,
+    pub joint_on: Vec<bool>,
+    pub clamps: Vec<ClampJoint>,
+
+    pub system: System,
+    /// Right side, then solution, one per node.
+    pub rhs: Vec<DVec3>,
+    pub step: Vec<DVec3>,
+    /// Predicted tension after the current iteration, for geometric stiffness.
+    pub tension: Vec<f64>,
+
+    /// Blocks of each living rod, and the zone of its thread contacts.
+    pub rods: Vec<(Range<usize>, Range<usize>)>,
+
+    pub candidates: Candidates,
+    pub rows: Rows,
+}
+
+impl Scratch {
+    /// Makes room for the model's arrays.
+    pub fn fit(&mut self, model: &crate::model::Model) {
+        let n = model.mass.len();
+        self.target.resize(n, DVec3::ZERO);
+        self.target_frame.resize(n, DQuat::IDENTITY);
+        self.start.resize(n, DVec3::ZERO);
+        self.start_frame.resize(n, DQuat::IDENTITY);
+        self.start_angle.resize(n, DVec3::ZERO);
+        self.force.resize(n, DVec3::ZERO);
+        self.torque.resize(n, DVec3::ZERO);
+        self.freedom.resize(2 * n, Freedom::Free);
+        self.joint_on.resize(n, true);
+        self.system.resize(n);
+        self.rhs.resize(2 * n, DVec3::ZERO);
+        self.step.resize(2 * n, DVec3::ZERO);
+        self.tension.resize(n, 0.0);
+        self.rods.clear();
+        for (_, rod) in model.rods.iter() {
+            let blocks = rod.particles();
+            let last = blocks.end - 1..blocks.end;
+            self.rods.push((blocks, last));
+        }
+    }
+}

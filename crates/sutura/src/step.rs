@@ -1,0 +1,363 @@
+//! The step. Stage order is decided here and nowhere else.
+
+use crate::collide;
+use crate::math::{Pose, exp, log};
+use crate::model::Model;
+use crate::model::grip::{Drive, Hold, LoadKind};
+use crate::model::shape::ShapeMotion;
+use crate::newton;
+use crate::report::{Incident, IncidentKind, StepReport};
+use crate::row;
+use crate::scratch::{ClampJoint, Freedom, Scratch};
+use crate::state::{GripState, State};
+use crate::view::View;
+use glam::{DQuat, DVec3};
+
+/// One call of `World::step`: its interval, and who watches.
+pub(crate) struct Interval<'a> {
+    /// Simulated time at its start and its length \[s\].
+    pub start: f64,
+    pub length: f64,
+    pub observe: &'a mut dyn FnMut(View<'_>),
+}
+
+/// Advances the whole world by the interval, in equal substeps no longer than the setting.
+pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, report: &mut StepReport) {
+    scratch.fit(model);
+    outside_forces(model, state, scratch);
+    let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
+    let h = interval.length / n;
+    report.converged = true;
+    for k in 0..n as u32 {
+        // The end of the last substep is the end of the interval, whatever the rounding.
+        let t = interval.start + h * f64::from(k);
+        if !advance(model, state, scratch, interval, t, h, 0, report) {
+            break;
+        }
+    }
+    state.time = interval.start + interval.length;
+    for (_, grip) in state.grips.iter_mut() {
+        grip.pose = grip.target;
+    }
+}
+
+/// Advances from `t` by `h`, or in two halves when the result is not acceptable. False when it got stuck.
+#[allow(clippy::too_many_arguments)]
+fn advance(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &mut Interval<'_>,
+    t: f64,
+    h: f64,
+    depth: u32,
+    report: &mut StepReport,
+) -> bool {
+    save(state, scratch, depth);
+    predict(model, state, scratch, interval, t + h, h);
+    collide::detect(model, state, scratch);
+    row::thread::begin(model, state, scratch, h);
+    row::shape::begin(model, state, scratch, h);
+    let outcome = newton::solve(model, state, scratch, h);
+    report.newton_iterations += outcome.iterations;
+    let verdict = if !outcome.finite {
+        Err("not finite")
+    } else if !outcome.converged && depth < model.settings.halvings {
+        Err("not converged")
+    } else {
+        collide::sweep(model, state, scratch)
+    };
+    match verdict {
+        Ok(clearance) => {
+            accept(model, state, scratch, h);
+            state.time = t + h;
+            report.substeps += 1;
+            report.residual = report.residual.max(outcome.residual);
+            report.thread_clearance = least(report.thread_clearance, clearance.thread);
+            report.shape_clearance = least(report.shape_clearance, clearance.shape);
+            if !outcome.converged {
+                report.converged = false;
+                report.incidents.push(Incident { time: state.time, kind: IncidentKind::NotConverged { residual: outcome.residual } });
+            }
+            (interval.observe)(View { model, state });
+            true
+        }
+        Err(reason) => {
+            restore(state, scratch, depth);
+            report.rejected += 1;
+            if depth < model.settings.halvings {
+                let half = 0.5 * h;
+                return advance(model, state, scratch, interval, t, half, depth + 1, report)
+                    && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
+            }
+            let kind = if outcome.finite { IncidentKind::Stuck { reason } } else { IncidentKind::NotFinite };
+            report.incidents.push(Incident { time: t, kind });
+            report.converged = false;
+            // Rest: what moved into this state must not push again.
+            state.velocity.fill(DVec3::ZERO);
+            state.angular_velocity.fill(DVec3::ZERO);
+            false
+        }
+    }
+}
+
+fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    }
+}
+
+fn save(state: &State, scratch: &mut Scratch, depth: u32) {
+    let depth = depth as usize;
+    if scratch.saved.len() <= depth {
+        scratch.saved.push(State::default());
+    }
+    scratch.saved[depth].copy_from(state);
+}
+
+fn restore(state: &mut State, scratch: &Scratch, depth: u32) {
+    state.copy_from(&scratch.saved[depth as usize]);
+}
+
+/// Loads that do not depend on the motion.
+fn outside_forces(model: &Model, state: &State, scratch: &mut Scratch) {
+    for i in 0..model.mass.len() {
+        scratch.force[i] = model.settings.gravity * model.mass[i];
+        scratch.torque[i] = DVec3::ZERO;
+    }
+    for (_, load) in state.loads.iter() {
+        let rod = model.rods.at(load.rod).expect("loads go with their rod");
+        match load.kind {
+            LoadKind::Point { place, force, torque } => {
+                let (e, s) = place.on_element(model, rod);
+                scratch.force[e] += force * (1.0 - s);
+                scratch.force[e + 1] += force * s;
+                scratch.torque[e] += torque;
+            }
+            LoadKind::Uniform { force_per_length } => {
+                for e in rod.elements() {
+                    let half = force_per_length * (0.5 * model.rest_length[e]);
+                    scratch.force[e] += half;
+                    scratch.force[e + 1] += half;
+                }
+            }
+            LoadKind::Mass { .. } => {}
+        }
+    }
+}
+
+/// Where each grip wants its piece at time `t`.
+fn grip_pose(grip: &GripState, interval: &Interval<'_>, t: f64) -> Pose {
+    let s = ((t - interval.start) / interval.length).clamp(0.0, 1.0);
+    let command = grip.pose.interpolate(&grip.target, s);
+    let u = if grip.ramp > 0.0 { (t - grip.taken_at) / grip.ramp } else { 1.0 };
+    if u >= 1.0 {
+        return command;
+    }
+    let along = t - grip.taken_at;
+    let own = Pose::new(
+        grip.taken_pose.position + grip.taken_velocity * along,
+        (exp(grip.taken_spin * along) * grip.taken_pose.orientation).normalize(),
+    );
+    own.interpolate(&command, smoothstep(u.max(0.0)))
+}
+
+/// 0 to 1 with zero slope at both ends.
+fn smoothstep(u: f64) -> f64 {
+    u * u * (3.0 - 2.0 * u)
+}
+
+/// Moves the state to the iterate that Newton starts from, where its velocity carries it (loads left out: a light end under load would
+/// start far away), and places what is held.
+fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, t: f64, h: f64) {
+    scratch.start.copy_from_slice(&state.position);
+    scratch.start_frame.copy_from_slice(&state.orientation);
+    scratch.freedom.fill(Freedom::Free);
+    scratch.joint_on.fill(true);
+    scratch.clamps.clear();
+    for (rod, _) in &scratch.rods {
+        for i in rod.clone() {
+            state.position[i] += state.velocity[i] * h;
+            scratch.target[i] = state.position[i];
+        }
+        for e in rod.start..rod.end - 1 {
+            if e > rod.start {
+                scratch.start_angle[e] = crate::rod::strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
+            }
+        }
+        for e in rod.start..rod.end - 1 {
+            let q = state.orientation[e];
+            let turned = exp(state.angular_velocity[e] * h);
+            state.orientation[e] = (turned * q).normalize();
+            scratch.target_frame[e] = state.orientation[e];
+        }
+    }
+    for (slot, grip) in state.grips.iter() {
+        let rod = model.rods.at(grip.rod).expect("grips go with their rod");
+        let first = rod.first as usize;
+        let pose = grip_pose(grip, interval, t);
+        let i = first + grip.index as usize;
+        let (line, count) = match grip.drive {
+            Drive::Pose => (None, 1.0),
+            Drive::Force { direction, force, speed_limit } => {
+                let u = if grip.ramp > 0.0 { ((t - grip.taken_at) / grip.ramp).clamp(0.0, 1.0) } else { 1.0 };
+                let force = force * smoothstep(u);
+                (Some((direction, force, force / speed_limit / h)), if grip.hold == Hold::Jaw { 0.5 } else { 1.0 })
+            }
+        };
+        let mut place = |i: usize, position: DVec3| match line {
+            None => {
+                scratch.freedom[2 * i] = Freedom::Held;
+                state.position[i] = position;
+            }
+            Some((direction, force, damper)) if force > 0.0 => {
+                scratch.freedom[2 * i] = Freedom::Line { direction, force: force * count, damper: damper * count };
+                let along = direction * direction.dot(state.position[i] - scratch.start[i]);
+                state.position[i] = scratch.start[i] + along;
+            }
+            Some(_) => {
+                scratch.freedom[2 * i] = Freedom::Held;
+                state.position[i] = scratch.start[i];
+            }
+        };
+        match grip.hold {
+            Hold::Pin => place(i, pose.position),
+            Hold::Clamp => {
+                place(i, pose.position);
+                if i > first && i < first + rod.n_elements as usize {
+                    scratch.joint_on[i] = false;
+                }
+                let stiffness = |e: usize| DVec3::new(rod.section.ei, rod.section.ei, rod.section.gj) / (0.5 * model.rest_length[e]);
+                let sides = [(i > first).then(|| (i - 1, false)), (i < first + rod.n_elements as usize).then_some((i, true))];
+                for (e, before) in sides.into_iter().flatten() {
+                    let q = scratch.start_frame[e];
+                    // Damping acts against the clamp's own orientation at the start of the substep.
+                    let held = grip_pose(grip, interval, t - h).orientation;
+                    let start = if before {
+                        crate::rod::strain::joint_angle(held, q, grip.rest_half)
+                    } else {
+                        crate::rod::strain::joint_angle(q, held, grip.rest_half)
+                    };
+                    scratch.clamps.push(ClampJoint {
+                        grip: slot,
+                        frame: e as u32,
+                        first: before,
+                        orientation: pose.orientation,
+                        rest_half: grip.rest_half,
+                        stiffness: stiffness(e),
+                        damping: rod.material.bend_damping,
+                        start,
+                    });
+                }
+            }
+            Hold::Jaw => {
+                let span = pose.orientation * grip.half_span;
+                place(i, pose.position - span);
+                place(i + 1, pose.position + span);
+                scratch.freedom[2 * i + 1] = Freedom::Held;
+                state.orientation[i] = pose.orientation;
+                scratch.target_frame[i] = pose.orientation;
+            }
+        }
+    }
+    for (slot, shape) in model.shapes.iter() {
+        let k = slot as usize;
+        if matches!(shape.motion, ShapeMotion::Driven) {
+            // Rate that reaches the target at the end of the interval; equal to interpolating from its start.
+            let left = interval.start + interval.length - (t - h);
+            let s = if left > h { h / left } else { 1.0 };
+            state.shape_pose[k] = state.shape_pose[k].interpolate(&state.shape_target[k], s);
+        }
+    }
+}
+
+/// Velocities from the motion, damping, plastic flow, and what the next substep starts from.
+fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
+    let keep_linear = libm::pow(1.0 - model.settings.linear_damping, h);
+    let keep_angular = libm::pow(1.0 - model.settings.angular_damping, h);
+    for (rod, _) in &scratch.rods {
+        for i in rod.clone() {
+            state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
+        }
+        for e in rod.start..rod.end - 1 {
+            state.angular_velocity[e] = log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
+            let strain = crate::rod::element_strain(model, state, e);
+            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
+        }
+    }
+    yield_plastic(model, state);
+    row::thread::finish(model, state, scratch);
+    row::shape::finish(model, state, scratch);
+    reactions(model, state, scratch, h);
+    state.last_h = h;
+}
+
+/// Bend and twist beyond yield become permanent (return mapping with isotropic hardening, bending radially in the two directions).
+fn yield_plastic(model: &Model, state: &mut State) {
+    for (_, rod) in model.rods.iter() {
+        let Some(p) = rod.material.plasticity else { continue };
+        // Plastic modulus so that the slope after yield is `hardening` times the elastic one.
+        let harden = p.hardening / (1.0 - p.hardening);
+        for e in rod.elements().skip(1) {
+            let l = model.joint_length[e];
+            let a = crate::rod::joint_angle(model, state, e);
+            let grown = 1.0 + harden * state.hardened[e];
+            let bend = (a.x * a.x + a.y * a.y).sqrt();
+            let over = bend - p.yield_curvature * l * grown;
+            if over > 0.0 {
+                let flow = over / (1.0 + harden);
+                state.plastic[e] += DVec3::new(a.x, a.y, 0.0) * (flow / bend);
+                state.hardened[e] += flow / (p.yield_curvature * l);
+            }
+            let over = a.z.abs() - p.yield_twist * l * grown;
+            if over > 0.0 {
+                let flow = over / (1.0 + harden);
+                state.plastic[e].z += flow * a.z.signum();
+                state.hardened[e] += flow / (p.yield_twist * l);
+            }
+        }
+    }
+}
+
+/// Force and torque of each grip on its thread, from what was left unbalanced at its nodes.
+fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
+    newton::unbalanced(model, state, scratch, h);
+    let (position, grips) = (&state.position, &mut state.grips);
+    for (slot, grip) in grips.iter_mut() {
+        let rod = model.rods.at(grip.rod).expect("grips go with their rod");
+        let i = rod.first as usize + grip.index as usize;
+        grip.torque = DVec3::ZERO;
+        grip.force = -scratch.rhs[2 * i];
+        match grip.hold {
+            Hold::Pin => {}
+            Hold::Clamp => {
+                for c in scratch.clamps.iter().filter(|c| c.grip == slot) {
+                    let (moment, _) = newton::clamp_terms(c, state.orientation[c.frame as usize], h);
+                    grip.torque += if c.first { -moment } else { moment };
+                }
+            }
+            Hold::Jaw => {
+                let other = -scratch.rhs[2 * i + 2];
+                let arm = (position[i + 1] - position[i]) * 0.5;
+                grip.torque = arm.cross(other - grip.force) - scratch.rhs[2 * i + 1];
+                grip.force += other;
+            }
+        }
+        if let Drive::Force { .. } = grip.drive {
+            let middle = if grip.hold == Hold::Jaw { (position[i] + position[i + 1]) * 0.5 } else { position[i] };
+            grip.pose.position = middle;
+            grip.target.position = middle;
+        }
+    }
+}
+
+/// Orientation held by a clamp that carries the moment there now.
+pub(crate) fn clamp_orientation(before: Option<DQuat>, after: Option<DQuat>, rest_half: DQuat) -> DQuat {
+    match (before, after) {
+        (Some(a), Some(b)) => (a * crate::math::half(a.conjugate() * b)).normalize(),
+        (None, Some(b)) => (b * (rest_half * rest_half).conjugate()).normalize(),
+        (Some(a), None) => (a * rest_half * rest_half).normalize(),
+        (None, None) => DQuat::IDENTITY,
+    }
+}

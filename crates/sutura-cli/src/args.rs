@@ -1,0 +1,272 @@
+//! What can be typed. The texts here are the manual of the program: each command says what it reads, what it writes and what its
+//! exit code means, and shows examples.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Real-time simulator of surgical thread: it ties knots that hold by friction, says which knot it is and measures the forces.
+#[derive(Parser, Debug)]
+#[command(name = "sutura", version, arg_required_else_help = false, subcommand_required = false, after_help = EXAMPLES)]
+pub struct Cli {
+    /// What to do; without it, the built-in scene `square_knot` is run.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  sutura                        tie a square knot (same as `sutura run square_knot`)
+  sutura scenes                 list the built-in scenes
+  sutura scenes copy capstan    copy one to ./capstan.toml, to change it
+  sutura run capstan.toml       run it; pictures, plots and numbers go to out/capstan
+  sutura knot out/capstan/trajectory.sutura
+                                say which knot a recording ends with
+
+Exit codes: 0 all is well; 1 a check of the scene failed; 2 the input could not be used.";
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Run a scene: simulate, measure, check, plot and draw it
+    Run(Run),
+    /// List the built-in scenes, show one or copy one out
+    Scenes(Scenes),
+    /// Say which knot a polyline or a recorded thread is tied in
+    Knot(Knot),
+    /// List sizes and materials of surgical thread with their sources
+    Presets(Presets),
+    /// Measure the speed of this build on this machine
+    Bench(Bench),
+}
+
+/// Run a scene: simulate, measure, check, plot and draw it.
+#[derive(Args, Debug, Default)]
+#[command(after_help = "\
+The folder then holds:
+  report.json         what was found: times, clearances, tensions, knots, checks, incidents
+  series/*.csv        probes and profiles; `frame.csv` has the numbers of every frame
+  plots/*.png, *.svg  the same as curves
+  stills/*.png        pictures of the whole thread and of its knot
+  trajectory.sutura   positions and orientations of every recorded frame
+Files that an earlier run left in the same folder are replaced.
+
+Examples:
+  sutura run square_knot                       a built-in scene, by name
+  sutura run my.toml --out /tmp/my --no-plots  a scene file
+  sutura run my.toml --still 0.5 --still 2     pictures at these times [s]
+  sutura run overhand --quiet && echo tied     for scripts
+
+Exit codes: 0 every check holds; 1 a check failed; 2 the scene could not be read.")]
+pub struct Run {
+    /// Scene file, or the name of a built-in scene
+    #[arg(value_name = "SCENE", default_value = "square_knot")]
+    pub scene: String,
+    /// Folder for the results [default: out/<scene>]
+    #[arg(long, short, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Draw no plots
+    #[arg(long)]
+    pub no_plots: bool,
+    /// Draw no pictures
+    #[arg(long)]
+    pub no_stills: bool,
+    /// Write no trajectory
+    #[arg(long)]
+    pub no_trajectory: bool,
+    /// Write no file at all
+    #[arg(long, conflicts_with_all = ["out", "no_plots", "no_stills", "no_trajectory"])]
+    pub dry: bool,
+    /// Time of a picture [s], instead of the scene's; may be given several times
+    #[arg(long = "still", value_name = "TIME", value_parser = time)]
+    pub stills: Vec<f64>,
+    /// Size of the pictures in pixels
+    #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1200x900", value_parser = size)]
+    pub picture_size: (u32, u32),
+    /// Direction in which the pictures look, for instance `0,1,-0.5` [default: the scene's, or one from which the knot is seen well]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub look: Option<[f64; 3]>,
+    /// Draw no progress bar and no table
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// List the built-in scenes, show one or copy one out.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+Examples:
+  sutura scenes
+  sutura scenes show overhand
+  sutura scenes copy overhand my.toml && sutura run my.toml")]
+pub struct Scenes {
+    /// What to do with them; without it, they are listed
+    #[command(subcommand)]
+    pub action: Option<ScenesAction>,
+}
+
+/// What to do with the built-in scenes.
+#[derive(Subcommand, Debug)]
+pub enum ScenesAction {
+    /// List them with their titles
+    List,
+    /// Print the text of one
+    Show {
+        /// Name of the scene
+        name: String,
+    },
+    /// Write one to a file; a file that exists is kept
+    Copy {
+        /// Name of the scene
+        name: String,
+        /// File to write [default: <name>.toml]
+        file: Option<PathBuf>,
+        /// Replace a file that exists
+        #[arg(long)]
+        force: bool,
+    },
+}
+
+/// Say which knot a polyline or a recorded thread is tied in.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+FILE is a table of points in order (comma-separated x, y, z; any unit; a line of headings and lines that begin with # are passed
+over), or the trajectory of a run.
+
+An open thread is no knot until its ends are joined. `--ends held` joins them far away along rays outward from the ends, as when two
+instruments hold them; `--ends free` tries 24 random closures, trims the tails, and calls the knot unknown when under 90 % agree.
+
+Examples:
+  sutura knot thread.csv
+  sutura knot ring.csv --closed --json
+  sutura knot out/square_knot/trajectory.sutura --time 4.5 --ends held
+  sutura knot thread.csv --expect square
+
+Exit codes: 0 recognized (or as expected); 1 not what `--expect` wants; 2 the file could not be read.")]
+pub struct Knot {
+    /// Table of points (CSV) or trajectory
+    pub file: PathBuf,
+    /// The last point is joined to the first
+    #[arg(long, conflicts_with = "ends")]
+    pub closed: bool,
+    /// How the ends of an open thread are joined
+    #[arg(long, value_enum, default_value_t = EndsOption::Free)]
+    pub ends: EndsOption,
+    /// Frame of a trajectory, from 0; negative counts from the end [default: the last]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "time")]
+    pub frame: Option<i64>,
+    /// Time in a trajectory [s]; the nearest frame is taken
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub time: Option<f64>,
+    /// Thread of a trajectory, by name [default: the first]
+    #[arg(long, value_name = "NAME")]
+    pub thread: Option<String>,
+    /// Seed of the random views and closures
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Name that the knot must have, for instance `square` or `trefoil-left`
+    #[arg(long, value_name = "NAME")]
+    pub expect: Option<String>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How the ends of an open thread are joined.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EndsOption {
+    /// Along rays outward from the ends
+    Held,
+    /// By many random closures, which must agree
+    Free,
+}
+
+/// List sizes and materials of surgical thread with their sources.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+A number marked with * is unverified: recalled or assumed, not read in the source named. Replace it where it matters.
+
+Examples:
+  sutura presets
+  sutura presets --json")]
+pub struct Presets {
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Measure the speed of this build on this machine.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied.
+Times are CPU times of the solver on one core; the median of a frame is the number to compare. Build with --release.
+
+Examples:
+  sutura bench
+  sutura bench --free --elements 120 --elements 500
+  sutura bench --json > bench.json")]
+pub struct Bench {
+    /// Only the free thread
+    #[arg(long)]
+    pub free: bool,
+    /// Only the knots
+    #[arg(long, conflicts_with = "free")]
+    pub knots: bool,
+    /// Number of elements of the free thread; may be given several times [default: 40, 120, 500, 2000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub elements: Vec<u32>,
+    /// Shape of the free thread before it is dropped [default: both]
+    #[arg(long, value_enum)]
+    pub shape: Option<FreeShape>,
+    /// Frames of the free thread
+    #[arg(long, default_value_t = 120, value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Shape of the free thread.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FreeShape {
+    /// Held out level
+    Straight,
+    /// Wound as a helix at rest
+    Helix,
+}
+
+fn time(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|t: &f64| t.is_finite() && *t >= 0.0).ok_or_else(|| "wanted a time >= 0 in seconds".into())
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let wanted = || "wanted WIDTHxHEIGHT in pixels, each from 16 to 8192, for instance 1200x900".to_string();
+    let (w, h) = text.split_once('x').ok_or_else(wanted)?;
+    let one = |t: &str| t.parse().ok().filter(|v| (16..=8192).contains(v)).ok_or_else(wanted);
+    Ok((one(w)?, one(h)?))
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let wanted = || "wanted three numbers with commas, not all zero, for instance 0,1,-0.5".to_string();
+    let v: Vec<f64> = text.split(',').map(|t| t.trim().parse()).collect::<Result<_, _>>().map_err(|_| wanted())?;
+    let v: [f64; 3] = v.try_into().map_err(|_| wanted())?;
+    (v.iter().all(|c| c.is_finite()) && v.iter().any(|c| *c != 0.0)).then_some(v).ok_or_else(wanted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_are_checked_where_they_are_typed() {
+        assert_eq!(size("640x480"), Ok((640, 480)));
+        assert!(size("640").is_err() && size("0x5").is_err() && size("99999x20").is_err());
+        assert_eq!(direction("0,1,-0.5"), Ok([0.0, 1.0, -0.5]));
+        assert!(direction("0,0,0").is_err() && direction("1,2").is_err() && direction("nan,0,1").is_err());
+        assert!(time("-1").is_err() && time("inf").is_err() && time("2.5") == Ok(2.5));
+    }
+}

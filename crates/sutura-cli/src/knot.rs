@@ -1,0 +1,178 @@
+//! The command `sutura knot`: which knot is it?
+
+use crate::args::{EndsOption, Knot};
+use crate::{say, say_json};
+use anyhow::{Context as _, bail};
+use std::path::Path;
+use sutura::glam::DVec3;
+use sutura::knot::{Ends, KnotType, recognize};
+use sutura_scene::Trajectory;
+
+/// What is printed as JSON.
+#[derive(serde::Serialize)]
+struct Answer<'a> {
+    file: String,
+    points: usize,
+    time_s: Option<f64>,
+    thread: Option<&'a str>,
+    ends: &'static str,
+    knot: &'static str,
+    title: String,
+    prime_parts: &'a str,
+    determinant: u64,
+    signature: i32,
+    alexander: &'a [i64],
+    crossings: usize,
+    views_agreed: u32,
+    views: u32,
+    closures_agreed: u32,
+    closures: u32,
+    trimmed: f64,
+    problem: Option<String>,
+}
+
+/// Runs the command; false when the knot is not the one expected.
+pub fn knot(args: &Knot) -> anyhow::Result<bool> {
+    if let Some(name) = &args.expect {
+        let known = || KnotType::NAMES.into_iter().chain(["unknown"]);
+        if !known().any(|n| n == name) {
+            let near = crate::nearest(name, known())
+                .map_or_else(|| format!("there are {}", known().collect::<Vec<_>>().join(", ")), |n| format!("did you mean `{n}`?"));
+            bail!("no knot is called `{name}`; {near}");
+        }
+    }
+    let curve = read(args)?;
+    let (ends, how) = match args.ends {
+        _ if args.closed => (Ends::Closed, "closed"),
+        EndsOption::Free => (Ends::Free, "free"),
+        EndsOption::Held => (held(&curve.points), "held"),
+    };
+    let found = recognize(&curve.points, ends, args.seed);
+    let answer = Answer {
+        file: args.file.display().to_string(),
+        points: curve.points.len(),
+        time_s: curve.time,
+        thread: curve.thread.as_deref(),
+        ends: how,
+        knot: found.knot.name(),
+        title: found.knot.to_string(),
+        prime_parts: &found.notation,
+        determinant: found.determinant,
+        signature: found.signature,
+        alexander: &found.alexander,
+        crossings: found.crossings,
+        views_agreed: found.projections_agreed,
+        views: found.projections_total,
+        closures_agreed: found.closures_agreed,
+        closures: found.closures_total,
+        trimmed: found.trimmed,
+        problem: found.problem.map(|p| format!("{p:?}")),
+    };
+    if args.json {
+        say_json(&answer)?;
+    } else {
+        say(&words(&answer))?;
+    }
+    Ok(args.expect.as_ref().is_none_or(|name| name == answer.knot))
+}
+
+fn words(a: &Answer<'_>) -> String {
+    let mut out = format!("{} ({})\n", a.title, a.knot);
+    let mut line = |name: &str, value: String| out.push_str(&format!("  {name:<12}{value}\n"));
+    if let (Some(thread), Some(time)) = (a.thread, a.time_s) {
+        line("thread", format!("{thread} at {time:.4} s"));
+    }
+    line("points", format!("{}, ends {}", a.points, a.ends));
+    if !a.prime_parts.is_empty() {
+        line("prime parts", a.prime_parts.to_string());
+    }
+    line("determinant", a.determinant.to_string());
+    line("signature", a.signature.to_string());
+    if !a.alexander.is_empty() {
+        line("Alexander", a.alexander.iter().map(i64::to_string).collect::<Vec<_>>().join(" "));
+    }
+    line("crossings", format!("{} after simplification", a.crossings));
+    let trimmed = if a.trimmed > 0.0 { format!(", {:.0} % trimmed from each end", 100.0 * a.trimmed) } else { String::new() };
+    line("agreement", format!("{} of {} views, {} of {} closures{trimmed}", a.views_agreed, a.views, a.closures_agreed, a.closures));
+    if let Some(problem) = &a.problem {
+        line("problem", problem.clone());
+    }
+    out
+}
+
+struct Curve {
+    points: Vec<DVec3>,
+    time: Option<f64>,
+    thread: Option<String>,
+}
+
+fn read(args: &Knot) -> anyhow::Result<Curve> {
+    let file = &args.file;
+    let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+    if !bytes.starts_with(b"SUTURATR") {
+        if args.frame.is_some() || args.time.is_some() || args.thread.is_some() {
+            bail!("{}: not a trajectory, so --frame, --time and --thread mean nothing", file.display());
+        }
+        return Ok(Curve { points: read_table(file, &bytes)?, time: None, thread: None });
+    }
+    let trajectory = Trajectory::from_bytes(&bytes).with_context(|| file.display().to_string())?;
+    let count = trajectory.frames.len();
+    let frame = match (args.frame, args.time) {
+        (Some(n), _) => {
+            let index = if n < 0 { n + count as i64 } else { n };
+            usize::try_from(index).ok().and_then(|i| trajectory.frames.get(i)).with_context(|| format!("{}: no frame {n}, it has {count}", file.display()))?
+        }
+        (None, Some(time)) => trajectory.nearest(time).with_context(|| format!("{}: no frames", file.display()))?,
+        (None, None) => trajectory.frames.last().with_context(|| format!("{}: no frames", file.display()))?,
+    };
+    let threads = &trajectory.header.threads;
+    let k = match &args.thread {
+        None => 0,
+        Some(name) => threads.iter().position(|t| t.name == *name).with_context(|| {
+            let names: Vec<&str> = threads.iter().map(|t| t.name.as_str()).collect();
+            format!("{}: no thread `{name}`; there are {}", file.display(), names.join(", "))
+        })?,
+    };
+    let points = frame.positions.get(k).with_context(|| format!("{}: no threads", file.display()))?;
+    Ok(Curve {
+        points: points.iter().map(|p| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))).collect(),
+        time: Some(frame.time),
+        thread: threads.get(k).map(|t| t.name.clone()),
+    })
+}
+
+/// Points from a table. The first row may hold headings; when they name x, y and z, those columns are taken, otherwise the first three.
+fn read_table(file: &Path, bytes: &[u8]) -> anyhow::Result<Vec<DVec3>> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut columns = [0, 1, 2];
+    let mut points = Vec::new();
+    for (row, record) in reader.records().enumerate() {
+        let record = record.with_context(|| file.display().to_string())?;
+        let line = record.position().map_or(0, csv::Position::line);
+        if row == 0 && record.iter().take(3).all(|f| f.parse::<f64>().is_err()) {
+            let named = |name: &str| record.iter().position(|f| f.split([' ', '[', '(']).next().is_some_and(|w| w.eq_ignore_ascii_case(name)));
+            if let (Some(x), Some(y), Some(z)) = (named("x"), named("y"), named("z")) {
+                columns = [x, y, z];
+            }
+            continue;
+        }
+        let mut p = [0.0; 3];
+        for (v, &column) in p.iter_mut().zip(&columns) {
+            let field = record.get(column).with_context(|| format!("{}:{line}: {} columns, wanted x, y, z", file.display(), record.len()))?;
+            *v = field.parse().ok().filter(|v: &f64| v.is_finite()).with_context(|| format!("{}:{line}: `{field}` is not a finite number", file.display()))?;
+        }
+        points.push(DVec3::from(p));
+    }
+    if points.len() < 3 {
+        bail!("{}: {} points, wanted at least 3 (comma-separated x, y, z)", file.display(), points.len());
+    }
+    Ok(points)
+}
+
+/// Ends held by instruments that came from outside: each ray leads away from the middle of the thread.
+fn held(points: &[DVec3]) -> Ends {
+    let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+    let (first, last) = (points[0], points[points.len() - 1]);
+    let outward = |end: DVec3, other: DVec3| [end - middle, end - other, DVec3::X].into_iter().find(|d| d.length() > 0.0).unwrap_or(DVec3::X);
+    Ends::Held { start: outward(first, last), end: outward(last, first) }
+}

@@ -1,0 +1,362 @@
+//! The command `sutura run`: step a scene to its end, write what it left behind, and say how it went.
+
+use crate::args::Run;
+use crate::plot::{Figure, Line, caption};
+use crate::still::{self, Camera, Look, Size, Solid, Subject, Tube};
+use crate::{say, scenes, table};
+use anyhow::Context as _;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use sutura::glam::{DQuat, DVec3};
+use sutura::{Geometry, Pose};
+use sutura_scene::{Frame, Header, Outcome, Report, Runner, Scene, Series, ShapeOutline};
+
+impl Run {
+    /// A built-in scene with everything left at its default.
+    pub fn of_sample(name: &str) -> Run {
+        Run { scene: name.into(), picture_size: (1200, 900), ..Run::default() }
+    }
+}
+
+/// Runs the command; false when a check failed.
+pub fn run(args: &Run) -> anyhow::Result<bool> {
+    let scene = load(&args.scene)?;
+    let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(scene.name()));
+    if !args.dry {
+        // Before the work, so that a folder that cannot be written is found at once.
+        std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+    }
+    let outcome = simulate(Runner::new(scene.clone())?, args.quiet);
+    if !args.dry {
+        write(&outcome, &scene, &folder, args)?;
+    }
+    if !args.quiet {
+        say(&summary(&outcome.report))?;
+        if !args.dry {
+            say(&format!("Results are in {}", folder.display()))?;
+        }
+    }
+    Ok(outcome.report.passed)
+}
+
+/// A scene file, or else a built-in scene of that name.
+pub fn load(scene: &str) -> anyhow::Result<Scene> {
+    let path = Path::new(scene);
+    if path.is_file() {
+        return Ok(Scene::load(path)?);
+    }
+    if path.components().count() > 1 {
+        anyhow::bail!("{scene}: there is no such file");
+    }
+    let sample = scenes::find(scene).with_context(|| format!("{scene}: there is no such file"))?;
+    Ok(Scene::parse(sample.text, &format!("{}.toml", sample.name))?)
+}
+
+/// Steps to the end under a progress bar.
+pub fn simulate(mut runner: Runner, quiet: bool) -> Outcome {
+    const LENGTH: u64 = 1000;
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(LENGTH) };
+    // The template is a constant; a default bar would do as well.
+    if let Ok(style) = ProgressStyle::with_template("{bar:30.blue/white} {percent:>3} %  {msg}") {
+        bar.set_style(style.progress_chars("━━─"));
+    }
+    let (mut solver_ms, mut drawn) = (0.0, Instant::now());
+    loop {
+        let p = runner.step_frame();
+        solver_ms += p.ms;
+        if p.finished {
+            break;
+        }
+        if drawn.elapsed() > Duration::from_millis(50) {
+            drawn = Instant::now();
+            bar.set_position((p.fraction.clamp(0.0, 1.0) * LENGTH as f64) as u64);
+            let factor = if solver_ms > 0.0 { 1e3 * p.time / solver_ms } else { 0.0 };
+            bar.set_message(format!("{}  {:.2} s  {factor:.1} x real time", p.phase, p.time));
+        }
+    }
+    bar.finish_and_clear();
+    runner.finish()
+}
+
+fn write(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow::Result<()> {
+    let put = |path: &Path, bytes: &[u8]| std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()));
+    let subfolder = |name: &str| -> anyhow::Result<PathBuf> {
+        let path = folder.join(name);
+        std::fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        Ok(path)
+    };
+    clear(folder);
+    put(&folder.join("report.json"), &serde_json::to_vec_pretty(&outcome.report)?)?;
+    let series_folder = subfolder("series")?;
+    for series in &outcome.series {
+        put(&series_folder.join(format!("{}.csv", file_name(&series.name))), series.to_csv().as_bytes())?;
+    }
+    for state in &outcome.saved {
+        put(&folder.join(file_name(&state.name)), &state.bytes)?;
+    }
+    if !args.no_trajectory {
+        let path = folder.join("trajectory.sutura");
+        outcome.trajectory.write_to(&path).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    if !args.no_plots {
+        let plots = subfolder("plots")?;
+        for (name, figure) in figures(outcome) {
+            figure.write(&plots.join(name))?;
+        }
+    }
+    if !args.no_stills {
+        draw_stills(outcome, scene, &subfolder("stills")?, args)?;
+    }
+    Ok(())
+}
+
+/// Pictures, plots and tables of an earlier run in the same folder would pass for those of this one.
+fn clear(folder: &Path) {
+    if !folder.join("report.json").is_file() {
+        return;
+    }
+    for (name, kinds) in [("series", &["csv"][..]), ("plots", &["png", "svg"]), ("stills", &["png"])] {
+        let Ok(entries) = std::fs::read_dir(folder.join(name)) else { continue };
+        for path in entries.filter_map(|e| e.ok().map(|e| e.path())) {
+            if path.extension().and_then(|e| e.to_str()).is_some_and(|e| kinds.contains(&e)) {
+                // What cannot be removed is overwritten or reported when it is written.
+                let _ = std::fs::remove_file(path);
+            }
+        }
+    }
+}
+
+/// A name as a file name on any system, and in this folder.
+fn file_name(name: &str) -> String {
+    let kept: String = name.chars().map(|c| if c.is_alphanumeric() || "_-.+".contains(c) { c } else { '_' }).collect();
+    kept.trim_matches(['.', '_']).to_string()
+}
+
+/// The plots of a run with their file names: from the series `frame` the numbers of every frame, and each probe.
+fn figures(outcome: &Outcome) -> Vec<(String, Figure)> {
+    let spans: Vec<(String, f64, f64)> = outcome.report.phases.iter().map(|p| (p.name.clone(), p.start_s, p.end_s)).collect();
+    let mut all: Vec<(String, Figure)> = Vec::new();
+    for series in &outcome.series {
+        // Columns of one unit share a picture; those of a frame are grouped by what they mean.
+        for (group, figure) in grouped(series) {
+            let over_time = series.columns.first().is_some_and(|c| c.0 == "time");
+            let figure = Figure { spans: if over_time { spans.clone() } else { Vec::new() }, ..figure };
+            if !figure.is_empty() {
+                all.push((file_name(&group), figure));
+            }
+        }
+    }
+    all
+}
+
+/// What columns of the series `frame` belong together: file name, title, ordinate, logarithmic or not, and how their names begin.
+const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
+    ("tension", "Largest tension", "tension", false, &["tension", "max_tension"]),
+    ("elongation", "Largest elongation of an element", "elongation", true, &["elongation", "max_elongation", "length_error"]),
+    (
+        "clearance",
+        "Closest gap: (distance - radii) / thread diameter",
+        "clearance",
+        false,
+        &["clearance", "thread_clearance", "shape_clearance", "min_clearance", "gap"],
+    ),
+    ("energy", "Mechanical energy", "energy", false, &["energy", "kinetic", "stretch", "bend", "twist"]),
+    ("ms_per_frame", "Solver time per frame", "time per frame", true, &["ms"]),
+    ("work", "Work of the solver per frame", "count", false, &["substeps", "rejected", "newton", "contacts"]),
+];
+
+fn grouped(series: &Series) -> Vec<(String, Figure)> {
+    let Some((x_name, x_unit)) = series.columns.first() else { return Vec::new() };
+    let x: Vec<f64> = series.rows.iter().map(|r| r[0]).collect();
+    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect() };
+    let figure = |title: &str, y: (&str, &str), log: bool, lines: Vec<Line>| Figure {
+        title: title.into(),
+        x: (x_name.clone(), x_unit.clone()),
+        y: (y.0.into(), y.1.into()),
+        lines,
+        log,
+        ..Figure::default()
+    };
+    let mut out = Vec::new();
+    if series.name == "frame" {
+        for (file, title, y_name, log, starts) in FRAME_PLOTS {
+            let columns = series.columns.iter().enumerate().skip(1).filter(|(_, (name, _))| starts.iter().any(|s| name.starts_with(s)));
+            let columns: Vec<_> = columns.collect();
+            let Some((_, (_, unit))) = columns.first() else { continue };
+            let lines = columns.iter().map(|(c, (name, _))| line(*c, &name.replace('_', " "))).collect();
+            out.push((file.to_string(), figure(title, (y_name, unit), log, lines)));
+        }
+        return out;
+    }
+    let mut units: Vec<&String> = Vec::new();
+    for (_, unit) in &series.columns[1..] {
+        if !units.contains(&unit) {
+            units.push(unit);
+        }
+    }
+    for unit in &units {
+        let columns: Vec<usize> = (1..series.columns.len()).filter(|c| series.columns[*c].1 == **unit).collect();
+        let first = &series.columns[columns[0]].0;
+        let name = if units.len() == 1 { series.name.clone() } else { format!("{}-{first}", series.name) };
+        let y_name = if columns.len() == 1 { first.as_str() } else { series.name.as_str() };
+        let lines = columns.iter().map(|c| line(*c, &series.columns[*c].0)).collect();
+        out.push((format!("probe-{name}"), figure(&series.name, (y_name, unit), false, lines)));
+    }
+    out
+}
+
+/// What a recorded frame shows.
+fn subject(header: &Header, frame: &Frame) -> Subject {
+    let point = |p: &[f32; 3]| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+    let tubes = header.threads.iter().zip(&frame.positions).map(|(t, x)| Tube { points: x.iter().map(point).collect(), radius: t.radius }).collect();
+    let solids = header.shapes.iter().zip(&frame.shapes).map(|(shape, (x, q))| {
+        let orientation = DQuat::from_array(q.map(f64::from)).normalize();
+        Solid { geometry: geometry(&shape.outline), pose: Pose::new(point(x), orientation) }
+    });
+    Subject { tubes, solids: solids.collect() }
+}
+
+fn geometry(outline: &ShapeOutline) -> Geometry {
+    match outline {
+        ShapeOutline::Plane => Geometry::Plane,
+        ShapeOutline::Sphere { radius } => Geometry::Sphere { radius: *radius },
+        ShapeOutline::Capsule { radius, half_length } => Geometry::Capsule { radius: *radius, half_length: *half_length },
+        ShapeOutline::Cylinder { radius, half_length } => Geometry::Cylinder { radius: *radius, half_length: *half_length },
+        ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from(*half_sides) },
+        ShapeOutline::Mesh { vertices, triangles } => {
+            Geometry::Mesh { vertices: vertices.iter().map(|v| DVec3::from(*v)).collect(), triangles: triangles.clone() }
+        }
+    }
+}
+
+/// Two pictures at each time: all of the threads, and the knot from near.
+fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow::Result<()> {
+    let trajectory = &outcome.trajectory;
+    let (Some(first), Some(last)) = (trajectory.frames.first(), trajectory.frames.last()) else { return Ok(()) };
+    let chosen = [&args.stills[..], scene.stills()].into_iter().find(|t| !t.is_empty());
+    let times = chosen.map_or_else(|| vec![first.time, 0.5 * (first.time + last.time), last.time], <[f64]>::to_vec);
+    let size = Size { width: args.picture_size.0, height: args.picture_size.1 };
+    let up = -DVec3::from(outcome.report.solver.gravity);
+    let up = up.try_normalize().unwrap_or(DVec3::Z);
+    // One direction for all pictures of a run, from which the last one shows its knot well.
+    let at_end = subject(&trajectory.header, last);
+    let direction = args.look.map_or_else(|| still::best_direction(&at_end, &still::knot_region(&at_end.tubes), up), DVec3::from);
+
+    let mut drawn: Vec<f64> = Vec::new();
+    for time in times {
+        let Some(frame) = trajectory.nearest(time) else { continue };
+        if drawn.contains(&frame.time) {
+            continue;
+        }
+        drawn.push(frame.time);
+        let subject = subject(&trajectory.header, frame);
+        let radius = subject.tubes.iter().map(|t| t.radius).fold(0.0, f64::max);
+        let all: Vec<DVec3> = subject.tubes.iter().flat_map(|t| t.points.iter().copied()).collect();
+        let near = still::knot_region(&subject.tubes);
+        for (name, points, margin) in [("", &all, 4.0), ("-near", &near, 10.0)] {
+            let look = Look { direction: Some(direction), up: Some(up), ..Look::default() };
+            let camera = Camera::fit(&look, points, margin * radius, size);
+            let mut image = still::render(&subject, &camera, size);
+            caption(&mut image, &format!("{}, {:.3} s", scene.title(), frame.time), camera.width())?;
+            image.write(&folder.join(format!("{:08.4}s{name}.png", frame.time)))?;
+        }
+    }
+    Ok(())
+}
+
+/// The tables printed at the end.
+fn summary(r: &Report) -> String {
+    let mut out = format!("{}\n\n", r.title);
+    let mut run = table(&["run", ""], &[]);
+    let gap = |g: Option<f64>| g.map_or_else(|| "nothing came near".into(), |g| format!("{g:.4}"));
+    let truth = |b: Option<bool>| b.map_or("not audited", |b| if b { "YES" } else { "no" });
+    run.add_row(["simulated".to_string(), format!("{:.3} s in {} frames", r.simulated_s, r.frames)]);
+    run.add_row(["solver".to_string(), format!("{:.3} s CPU", r.cpu_s)]);
+    run.add_row(["real-time factor".to_string(), format!("{:.2}, worst second {:.2}", r.real_time_factor, r.worst_second_real_time_factor)]);
+    let t = &r.ms_per_frame;
+    run.add_row(["ms per frame".to_string(), format!("median {:.3}, p99 {:.3}, most {:.3}", t.median, t.p99, t.max)]);
+    let c = &r.min_clearance;
+    run.add_row(["least clearance [diameters]".to_string(), format!("thread-thread {}, thread-shape {}", gap(c.thread_thread), gap(c.thread_shape))]);
+    run.add_row(["passes through".to_string(), truth(r.passes_through).to_string()]);
+    run.add_row(["state hash".to_string(), r.state_hash.clone()]);
+    out.push_str(&format!("{run}\n"));
+
+    let mut threads = table(&["thread", "elements", "length [mm]", "radius [mm]", "max elongation", "max tension [N]", "knot"], &[1, 2, 3, 4, 5]);
+    for t in &r.threads {
+        let knot = t.knot.as_ref().map_or_else(|| "-".into(), |k| format!("{} (det {}, sig {}, {}/{})", k.name, k.determinant, k.signature, k.agreed, k.tried));
+        threads.add_row([
+            t.name.clone(),
+            t.elements.to_string(),
+            format!("{:.2}", 1e3 * t.length_m),
+            format!("{:.4}", 1e3 * t.radius_m),
+            format!("{:.2e}", t.max_elongation),
+            format!("{:.4}", t.max_tension_n),
+            knot,
+        ]);
+    }
+    if !r.threads.is_empty() {
+        out.push_str(&format!("{threads}\n"));
+    }
+    let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
+    for p in &r.phases {
+        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}", k.name)).collect();
+        phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
+    }
+    if !r.phases.is_empty() {
+        out.push_str(&format!("{phases}\n"));
+    }
+    let mut probes = table(&["probe", "unit", "first", "last", "least", "greatest"], &[2, 3, 4, 5]);
+    for p in &r.probes {
+        let short = |v: f64| if v == 0.0 || (1e-3..1e5).contains(&v.abs()) { format!("{v:.5}") } else { format!("{v:.4e}") };
+        probes.add_row([p.name.clone(), p.unit.clone(), short(p.first), short(p.last), short(p.min), short(p.max)]);
+    }
+    if !r.probes.is_empty() {
+        out.push_str(&format!("{probes}\n"));
+    }
+    let mut checks = table(&["check", "found", "unit", "wanted", ""], &[1]);
+    for c in &r.checks {
+        let found = c.value.as_ref().map_or_else(|| "never reached".into(), ToString::to_string);
+        checks.add_row([c.name.clone(), found, c.unit.clone(), c.wanted.clone(), if c.passed { "passed" } else { "FAILED" }.into()]);
+    }
+    if !r.checks.is_empty() {
+        out.push_str(&format!("{checks}\n"));
+    }
+    for i in &r.incidents {
+        let last = if i.count > 1 { format!(" to {:.4} s, {} times", i.last_s, i.count) } else { String::new() };
+        out.push_str(&format!("incident at {:.4} s{last}: {}\n", i.first_s, i.message));
+    }
+    for passage in &r.passages {
+        out.push_str(&format!("passed through: {passage}\n"));
+    }
+    let failed = r.checks.iter().filter(|c| !c.passed).count();
+    let verdict = match (r.passed, failed) {
+        (true, _) if r.checks.is_empty() => "No checks in this scene.".to_string(),
+        (true, _) => format!("All {} checks passed.", r.checks.len()),
+        (false, 0) => "FAILED: a phase ran out of time.".to_string(),
+        (false, n) => format!("FAILED: {n} of {} checks.", r.checks.len()),
+    };
+    out.push_str(&verdict);
+    out.push('\n');
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_names_stay_in_the_folder() {
+        assert_eq!(file_name("tension(left)"), "tension_left");
+        assert_eq!(file_name("../../etc/passwd"), "etc_passwd");
+        assert_eq!(file_name("tied.state"), "tied.state");
+    }
+
+    #[test]
+    fn columns_of_one_unit_share_a_picture() {
+        let columns = [("time", "s"), ("x", "m"), ("y", "m"), ("force", "N")].map(|(n, u)| (n.to_string(), u.to_string())).to_vec();
+        let series = Series { name: "end".into(), columns, rows: vec![vec![0.0, 1.0, 2.0, 3.0], vec![1.0, 2.0, 3.0, 4.0]] };
+        let names: Vec<(String, usize)> = grouped(&series).into_iter().map(|(n, f)| (n, f.lines.len())).collect();
+        assert_eq!(names, [("probe-end-x".to_string(), 2), ("probe-end-force".to_string(), 1)]);
+    }
+}

@@ -15,10 +15,10 @@
 
 mod distance;
 
-use crate::knot::boxes::{Aabb, BoxTree};
+use crate::knot::space::{Aabb, BoxTree, segment_triangle, segments};
 use crate::math::log;
 use crate::{Geometry, Pose, ShapeView, View};
-use distance::{segment_solid, segment_triangle, segments, time_within};
+use distance::{segment_solid, time_within};
 use glam::DVec3;
 
 /// What passed through what.

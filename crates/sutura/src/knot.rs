@@ -9,11 +9,11 @@
 //!
 //! Topology does not tell a flat square knot from one that has capsized into sliding half hitches.
 
-pub(crate) mod boxes;
 mod diagram;
 mod entries;
 mod linking;
 mod reduce;
+pub(crate) mod space;
 
 pub use entries::{Entries, entries};
 pub use linking::{gauss_linking, writhe};
@@ -175,7 +175,7 @@ pub fn recognize(points: &[DVec3], ends: Ends, seed: u64) -> Recognition {
 /// Neighbors at one place are made one point, and everything is brought to a ball of radius about one. The scale is a power of
 /// two, which keeps the digits. `None` when nothing is left.
 fn prepared(points: &[DVec3], closed: bool) -> Option<Vec<DVec3>> {
-    let b = boxes::Aabb::around(points);
+    let b = space::Aabb::around(points);
     let (middle, size) = (0.5 * b.min + 0.5 * b.max, (0.5 * b.max - 0.5 * b.min).length());
     if !(middle.is_finite() && size.is_finite() && size > 0.0) {
         return None;
@@ -284,6 +284,7 @@ fn recognize_closures(closures: &[Vec<DVec3>], rng: &mut Rng) -> Recognition {
 fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     // How often a polygon that resists is shaken and looked at again for a simpler view.
     const SHAKES: u32 = 60;
+    const MOST_SHAKEN: usize = 200;
     reduce::reduce(&mut polygon, true, &[]);
     if polygon.len() < 6 {
         // No knot has fewer than six sticks.
@@ -292,14 +293,14 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     let mut views: Vec<(Invariants, Vec<Part>)> = Vec::new();
     let mut problem = None;
     for _ in 0..PROJECTIONS {
-        match view(&polygon, rng) {
+        match view(&polygon, rng).ok_or(Problem::Degenerate).and_then(|v| identify(&v)) {
             Ok(v) => views.push(v),
             Err(p) => problem = Some(p),
         }
     }
+    let has_name = |v: &(Invariants, Vec<Part>)| v.1.iter().all(|p| p.prime.is_some());
     let mut shakes = 0;
-    let named = |views: &[(Invariants, Vec<Part>)]| views.iter().any(|(_, parts)| parts.iter().all(|p| p.prime.is_some()));
-    while !named(&views) && shakes < SHAKES && polygon.len() < 200 {
+    while !views.iter().any(has_name) && shakes < SHAKES && polygon.len() < MOST_SHAKEN {
         shakes += 1;
         reduce::shake(&mut polygon, rng);
         let mut thinned = polygon.clone();
@@ -307,18 +308,23 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
         if thinned.len() < polygon.len() || shakes % 4 == 0 {
             polygon = thinned;
         }
-        if let Ok(v) = view(&polygon, rng) {
-            // A view replaces a worse one with the same invariants, so the number of views stays.
-            match views.iter().position(|w| w.0 == v.0 && crossings(&v.1) < crossings(&w.1)) {
-                Some(k) => views[k] = v,
-                None if (views.len() as u32) < PROJECTIONS => views.push(v),
-                None => {}
-            }
+        let Some(summands) = view(&polygon, rng) else { continue };
+        let n: usize = summands.iter().map(Diagram::n_crossings).sum();
+        let fewest = views.iter().map(|v| crossings(&v.1)).min();
+        if fewest.is_some_and(|f| n >= f) {
+            continue;
+        }
+        let Ok(better) = identify(&summands) else { continue };
+        // It replaces a worse view with the same invariants, so that the number of views stays.
+        match views.iter().position(|v| v.0 == better.0) {
+            Some(k) => views[k] = better,
+            None if (views.len() as u32) < PROJECTIONS => views.push(better),
+            None => {}
         }
     }
     let agreed = |v: &Invariants| views.iter().filter(|w| w.0 == *v).count();
     // The simplest of the views on which most agree; one with a name before one without.
-    let best = views.iter().max_by_key(|(v, parts)| (agreed(v), named(&[(v.clone(), parts.clone())]), core::cmp::Reverse(crossings(parts))));
+    let best = views.iter().max_by_key(|(v, parts)| (agreed(v), parts.iter().all(|p| p.prime.is_some()), core::cmp::Reverse(crossings(parts))));
     let Some((invariants, parts)) = best else { return Recognition::failed(problem.unwrap_or(Problem::Degenerate)) };
     let mut answer = Recognition::named(parts, invariants);
     answer.projections_agreed = agreed(invariants) as u32;
@@ -355,25 +361,42 @@ fn crossings(parts: &[Part]) -> usize {
     parts.iter().map(|p| p.crossings).sum()
 }
 
-/// The summands in one view from a random direction, and the invariants of their sum.
-fn view(polygon: &[DVec3], rng: &mut Rng) -> Result<(Invariants, Vec<Part>), Problem> {
-    let Some(diagram) = (0..8).find_map(|_| {
+/// The connected summands seen from a random direction, the simplest of a few. `None` when none was in general position.
+fn view(polygon: &[DVec3], rng: &mut Rng) -> Option<Vec<Diagram>> {
+    const DIRECTIONS: usize = 4;
+    const ATTEMPTS: usize = 16;
+    let mut turned = Vec::new();
+    let mut simplest: Option<(usize, Vec<Diagram>)> = None;
+    let mut seen = 0;
+    for _ in 0..ATTEMPTS {
         let turn = rng.rotation();
-        Diagram::project(&polygon.iter().map(|p| turn * *p).collect::<Vec<_>>())
-    }) else {
-        return Err(Problem::Degenerate);
-    };
+        turned.clear();
+        turned.extend(polygon.iter().map(|p| turn * *p));
+        let Some(diagram) = Diagram::project(&turned) else { continue };
+        let summands = diagram.summands();
+        let n = summands.iter().map(Diagram::n_crossings).sum();
+        if simplest.as_ref().is_none_or(|s| n < s.0) {
+            simplest = Some((n, summands));
+        }
+        seen += 1;
+        if seen == DIRECTIONS {
+            break;
+        }
+    }
+    simplest.map(|s| s.1)
+}
+
+/// What the summands are, and the invariants of their sum.
+fn identify(summands: &[Diagram]) -> Result<(Invariants, Vec<Part>), Problem> {
     let mut sum = Invariants::unknot();
     let mut parts = Vec::new();
-    for part in diagram.summands() {
-        let n = part.n_crossings();
-        if n > MOST_CROSSINGS {
-            return Err(Problem::TooTangled);
-        }
-        let invariants = part.invariants().ok_or(Problem::TooTangled)?;
+    for summand in summands {
+        let n = summand.n_crossings();
+        let invariants = if n > MOST_CROSSINGS { None } else { summand.invariants() };
+        let invariants = invariants.ok_or(Problem::TooTangled)?;
         sum = sum.sum(&invariants).ok_or(Problem::TooTangled)?;
         match primes_of(&invariants, n) {
-            Some(primes) => parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings().max(n / 2) })),
+            Some(primes) => parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings() })),
             None => parts.push(Part { prime: None, crossings: n }),
         }
     }

@@ -1,53 +1,13 @@
-//! Distances of segments, triangles and solids, and whether a moving distance ever gets small. Written for the audit alone: it must
-//! not share a mistake with the contact code.
+//! Distances of segments from solids, and whether a moving distance ever gets small. Written for the audit alone: it must not share a
+//! mistake with the contact code.
 //!
 //! A sweep needs no polynomial roots. While the ends of two segments move along straight lines, their distance changes no faster
 //! than the fastest pair of ends; so a distance `d` at one instant keeps it above zero for a time `d / rate` on both sides. Halving
 //! what is not yet excluded ends at the crossing or at nothing, and moves within one plane or end to end are no special cases.
 
 use crate::Geometry;
+use crate::knot::space::{point_segment, segments};
 use glam::DVec3;
-
-/// Distance of a point from a segment.
-fn point_segment(p: DVec3, [a, b]: [DVec3; 2]) -> f64 {
-    let ab = b - a;
-    let along = (p - a).dot(ab) / ab.length_squared();
-    // A segment without length gives NaN here, and is a point.
-    let u = if along.is_finite() { along.clamp(0.0, 1.0) } else { 0.0 };
-    p.distance(a + ab * u)
-}
-
-/// Distance of two segments: between their insides where the common perpendicular meets both, otherwise from an end.
-pub(super) fn segments(p: [DVec3; 2], q: [DVec3; 2]) -> f64 {
-    let (u, v, w) = (p[1] - p[0], q[1] - q[0], p[0] - q[0]);
-    let (a, b, c, d, e) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
-    let det = a * c - b * b;
-    let (s, t) = (b * e - c * d, a * e - b * d);
-    let inside = if s > 0.0 && s < det && t > 0.0 && t < det { (w + u * (s / det) - v * (t / det)).length() } else { f64::INFINITY };
-    // The ends always count: for nearly parallel segments the perpendicular is mostly round-off.
-    inside.min(point_segment(p[0], q)).min(point_segment(p[1], q)).min(point_segment(q[0], p)).min(point_segment(q[1], p))
-}
-
-/// Distance of a segment from a triangle, zero where it goes through.
-pub(super) fn segment_triangle(p: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> f64 {
-    let normal = (b - a).cross(c - a);
-    let height = |x: DVec3| (x - a).dot(normal);
-    let over_triangle = |x: DVec3| {
-        let turn = |from: DVec3, to: DVec3| (to - from).cross(x - from).dot(normal);
-        turn(a, b) >= 0.0 && turn(b, c) >= 0.0 && turn(c, a) >= 0.0
-    };
-    let (h0, h1) = (height(p[0]), height(p[1]));
-    if h0 * h1 <= 0.0 && h0 != h1 && over_triangle(p[0].lerp(p[1], h0 / (h0 - h1))) {
-        return 0.0;
-    }
-    let mut d = segments(p, [a, b]).min(segments(p, [b, c])).min(segments(p, [c, a]));
-    for (x, h) in [(p[0], h0), (p[1], h1)] {
-        if over_triangle(x) {
-            d = d.min(h.abs() / normal.length());
-        }
-    }
-    d
-}
 
 /// Least signed distance of a segment from the surface of a convex solid, negative inside, in the solid's own frame. Infinite for
 /// the mesh, which is no solid.
@@ -124,43 +84,6 @@ mod tests {
     }
 
     proptest! {
-        /// A search over a grid of places cannot find less, and comes as near as its spacing.
-        #[test]
-        fn segment_distance_is_the_minimum(p in [point(), point()], q in [point(), point()]) {
-            let d = segments(p, q);
-            let n = 60;
-            let mut least = f64::INFINITY;
-            for i in 0..=n {
-                for j in 0..=n {
-                    let at = |s: [DVec3; 2], k: i32| s[0].lerp(s[1], f64::from(k) / f64::from(n));
-                    least = least.min(at(p, i).distance(at(q, j)));
-                }
-            }
-            prop_assert!(d <= least + 1e-14);
-            let spacing = 0.5 * (p[0].distance(p[1]) + q[0].distance(q[1])) / f64::from(n);
-            prop_assert!(d >= least - spacing, "{d} {least}");
-        }
-
-        #[test]
-        fn triangle_distance_is_the_minimum(p in [point(), point()], t in [point(), point(), point()]) {
-            let d = segment_triangle(p, t);
-            let n = 30;
-            let mut least = f64::INFINITY;
-            for i in 0..=n {
-                let x = p[0].lerp(p[1], f64::from(i) / f64::from(n));
-                for j in 0..=n {
-                    for k in 0..=n - j {
-                        let (u, v) = (f64::from(j) / f64::from(n), f64::from(k) / f64::from(n));
-                        least = least.min(x.distance(t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v));
-                    }
-                }
-            }
-            prop_assert!(d <= least + 1e-14);
-            // Half a grid cell on each of the three edges.
-            let spacing = 0.5 * (p[0].distance(p[1]) + t[0].distance(t[1]) + t[0].distance(t[2])) / f64::from(n);
-            prop_assert!(d >= least - spacing, "{d} {least}");
-        }
-
         #[test]
         fn solid_distance_is_the_minimum(p in [point(), point()]) {
             let box_ = Geometry::Box { half_sides: DVec3::new(0.3, 0.4, 0.5) };

@@ -2,9 +2,8 @@
 //! and signature from a Goeritz matrix (Gordon and Litherland 1978), Alexander polynomial from the Wirtinger relations. All of it is
 //! integer arithmetic. A positive crossing is right-handed; a right-handed trefoil has signature -2.
 
-use super::reduce::side;
 use glam::DVec3;
-use robust::{Coord, orient2d};
+use robust::{Coord, Coord3D, orient2d, orient3d};
 
 /// One passage through a crossing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,6 +43,13 @@ impl Invariants {
         }
         Some(Invariants { determinant: self.determinant.checked_mul(other.determinant)?, signature: self.signature + other.signature, alexander })
     }
+}
+
+/// Sign of the volume of `abcd`: that of `(b - a) x (d - c) . (c - a)`.
+fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
+    let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
+    let volume = orient3d(coord(a), coord(b), coord(c), coord(d));
+    i8::from(volume > 0.0) - i8::from(volume < 0.0)
 }
 
 impl Diagram {
@@ -462,6 +468,12 @@ mod tests {
         let values: Vec<u64> = (0..5_i64).map(|t| (2 - 3 * t + t * t * t) as u64).collect();
         let lifted: Vec<i64> = modular::interpolate(&values).into_iter().map(modular::lift).collect();
         assert_eq!(lifted, [2, -3, 0, 1, 0]);
+    }
+
+    #[test]
+    fn the_side_has_the_sign_of_the_triple_product() {
+        // (b - a) x (d - c) . (c - a) for a = 0, b = x, c = z, d = z + y is x x y . z = 1.
+        assert_eq!(side(DVec3::ZERO, DVec3::X, DVec3::Z, DVec3::Z + DVec3::Y), 1);
     }
 
     #[test]

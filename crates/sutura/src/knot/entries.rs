@@ -9,7 +9,7 @@
 //! Each place is found where the distance to the other strand is exactly 1.2 diameters, between particles too, and measured in rest
 //! arc length. So it moves continuously while the thread does, and stays when the whole knot moves.
 
-use super::boxes::{Aabb, BoxTree};
+use super::space::{Aabb, BoxTree};
 use glam::DVec3;
 
 /// Rest arc lengths from the start of the thread at which it enters and leaves its knot \[m\].

@@ -59,9 +59,10 @@ impl Doc {
         let problem = Problem { file: self.file.clone(), line: Some(line), column: Some(column), key: key.into(), message: message.into(), help };
         self.problems.borrow_mut().push((at, problem));
     }
-    /// Whether nothing was wrong so far.
-    pub fn is_clean(&self) -> bool {
-        self.problems.borrow().is_empty()
+    /// Notes a problem at a place read before.
+    pub fn problem_at(&self, location: &Location, message: impl Into<String>) {
+        let at = self.text.split_inclusive('\n').take(location.line.saturating_sub(1)).map(str::len).sum();
+        self.problem(at, &location.key, message, None);
     }
     /// `Ok` when nothing was wrong, else all problems in the order of the file, each place and message once.
     pub fn verdict(&self) -> Result<(), SceneError> {

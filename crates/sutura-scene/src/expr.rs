@@ -126,6 +126,7 @@ pub enum Read {
     Wrench,
     Distance,
     Gap,
+    MinClearance,
     Clearance,
     ThreadClearance,
     ShapeClearance,
@@ -146,6 +147,7 @@ pub enum Read {
     Determinant,
     Signature,
     Entries,
+    Slip,
     PassesThrough,
 }
 
@@ -183,7 +185,7 @@ enum Wants {
 
 const WRENCH: &[(&str, Dim)] = &[("fx", Dim::FORCE), ("fy", Dim::FORCE), ("fz", Dim::FORCE), ("mx", Dim::TORQUE), ("my", Dim::TORQUE), ("mz", Dim::TORQUE)];
 const QUATERNION: &[(&str, Dim)] = &[("qx", Dim::NUMBER), ("qy", Dim::NUMBER), ("qz", Dim::NUMBER), ("qw", Dim::NUMBER)];
-const ENTRIES: &[(&str, Dim)] = &[("first", Dim::LENGTH), ("last", Dim::LENGTH)];
+const ENTRIES: &[(&str, Dim)] = &[("tail_a", Dim::LENGTH), ("loop_a", Dim::LENGTH), ("loop_b", Dim::LENGTH), ("tail_b", Dim::LENGTH)];
 
 struct Function {
     name: &'static str,
@@ -228,6 +230,7 @@ const FUNCTIONS: &[Function] = &[
     f("wrench", Read::Wrench, &[Wants::GripOrShape], 1, Gives::Columns(WRENCH)),
     f("distance", Read::Distance, &[Wants::Place, Wants::Place], 2, Gives::Number(Dim::LENGTH)),
     f("gap", Read::Gap, &[Wants::Thread, Wants::ThreadOrShape], 1, Gives::Number(Dim::LENGTH)),
+    f("min_clearance", Read::MinClearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("clearance", Read::Clearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("thread_clearance", Read::ThreadClearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("shape_clearance", Read::ShapeClearance, &[], 0, Gives::Number(Dim::NUMBER)),
@@ -248,6 +251,7 @@ const FUNCTIONS: &[Function] = &[
     f("determinant", Read::Determinant, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("signature", Read::Signature, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("entries", Read::Entries, &[Wants::Thread], 1, Gives::Columns(ENTRIES)),
+    f("slip", Read::Slip, &[Wants::Thread], 1, Gives::Number(Dim::LENGTH)),
     f("passes_through", Read::PassesThrough, &[], 0, Gives::Truth),
 ];
 
@@ -338,20 +342,6 @@ impl Expr {
     pub fn holds(&self, live: &dyn Live) -> bool {
         self.value(live) == Value::Truth(true)
     }
-    /// Threads whose knot it asks for.
-    pub fn uses(&self, wanted: &dyn Fn(Read) -> bool) -> bool {
-        fn walk(node: &Node, wanted: &dyn Fn(Read) -> bool) -> bool {
-            match node {
-                Node::Read(r, _) => wanted(*r),
-                Node::Maths(_, args) => args.iter().any(|a| walk(a, wanted)),
-                Node::Vector(v) => v.iter().any(|a| walk(a, wanted)),
-                Node::Pick(a, _) | Node::Negate(a) | Node::Not(a) => walk(a, wanted),
-                Node::Binary(_, a, b) => walk(a, wanted) || walk(b, wanted),
-                Node::Constant(_) | Node::Probe(_) => false,
-            }
-        }
-        walk(&self.node, wanted)
-    }
 }
 
 fn number(value: &Value) -> f64 {
@@ -367,6 +357,11 @@ fn vector(value: &Value) -> DVec3 {
         Value::Vector(v) => *v,
         _ => DVec3::NAN,
     }
+}
+
+/// Whether a text is the one wanted. The name of a knot without its hand stands for both: `trefoil` for `trefoil-left`.
+pub fn texts_match(found: &str, wanted: &str) -> bool {
+    found == wanted || found.strip_suffix("-right").or(found.strip_suffix("-left")) == Some(wanted)
 }
 
 fn eval(node: &Node, live: &dyn Live) -> Value {
@@ -434,7 +429,11 @@ fn eval(node: &Node, live: &dyn Live) -> Value {
                 },
                 Op::Eq | Op::Ne => {
                     let missing = matches!(&a, Value::Number(v) if v.is_nan()) || matches!(&b, Value::Number(v) if v.is_nan());
-                    Value::Truth(!missing && (a == b) == (*op == Op::Eq))
+                    let same = match (&a, &b) {
+                        (Value::Text(a), Value::Text(b)) => texts_match(a, b) || texts_match(b, a),
+                        _ => a == b,
+                    };
+                    Value::Truth(!missing && same == (*op == Op::Eq))
                 }
                 Op::Lt => Value::Truth(x < y),
                 Op::Le => Value::Truth(x <= y),

@@ -5,17 +5,23 @@
 //! everything past the loader is in SI units.
 
 mod curve;
+mod distance;
 mod doc;
 mod error;
 mod expr;
+mod judge;
+mod load;
 mod motion;
 pub mod presets;
 mod report;
 mod runner;
 mod samples;
+mod saved;
 mod scene;
+mod stage;
 mod trajectory;
 mod units;
+mod watch;
 
 pub use error::{Problem, SceneError};
 pub use report::{
@@ -24,5 +30,5 @@ pub use report::{
 };
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
-pub use scene::Scene;
+pub use scene::{Camera, Scene};
 pub use trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory, TrajectoryError};

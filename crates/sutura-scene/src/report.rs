@@ -280,6 +280,9 @@ pub struct PhaseReport {
     pub end_s: f64,
     /// `duration`, `condition`, `motions done`, or `out of time`.
     pub ended_by: String,
+    /// Whether the scene wants a still picture of its end.
+    #[serde(default)]
+    pub still: bool,
     /// Recognised knots at its end where asked: thread and knot.
     pub knots: Vec<(String, KnotReport)>,
 }

@@ -1,16 +1,48 @@
 //! Steps a scene frame by frame: phases, motions, probes, checks, recording.
 
 use crate::error::SceneError;
-use crate::report::Outcome;
-use crate::scene::Scene;
-use crate::trajectory::{Frame, Header};
-use sutura::World;
+use crate::report::{Clearance, FrameTimes, IncidentReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WorkReport};
+use crate::scene::{End, Late, Moment, Scene};
+use crate::stage::{FrameReport, Stage, lesser};
+use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory};
+use crate::watch::{Check, Probe, profile};
+use cpu_time::ThreadTime;
+use std::mem::discriminant;
+use std::time::Duration;
+use sutura::glam::{DQuat, DVec3};
+use sutura::{Geometry, IncidentKind, World};
 
 /// A scene being run.
 pub struct Runner {
     scene: Scene,
-    world: World,
+    stage: Stage,
+    /// World time at which the scene began \[s\] (a saved state has its own).
+    world_start: f64,
+    frame: u64,
+    phase: usize,
+    finished: bool,
+    /// Whether a phase that must not ran out of time.
+    late: bool,
+    probes: Vec<Probe>,
+    profiles: Vec<Series>,
+    /// Profiles still to be read, by their number in the scene.
+    profiles_open: Vec<usize>,
+    checks: Vec<Check>,
+    frames: Series,
+    trajectory: Trajectory,
+    saved: Vec<SavedState>,
+    phases: Vec<PhaseReport>,
+    incidents: Vec<(IncidentKey, IncidentReport)>,
+    work: WorkReport,
+    max_elongation: Vec<f64>,
+    max_tension: Vec<f64>,
+    /// Solver time of each frame \[s\].
+    cpu: Vec<f64>,
+    /// Frames in a row in which no good substep was found.
+    stuck: u32,
 }
+
+type IncidentKey = Option<std::mem::Discriminant<IncidentKind>>;
 
 /// How far a run is.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,34 +61,475 @@ pub struct Progress {
     pub finished: bool,
 }
 
+/// Frames without a good substep after which a run is given up.
+const GIVE_UP: u32 = 30;
+
 impl Runner {
     /// Builds the world of a scene.
     pub fn new(scene: Scene) -> Result<Runner, SceneError> {
-        let world = World::new(sutura::Settings::default()).map_err(|e| SceneError::of_file(scene.name(), e.to_string()))?;
-        Ok(Runner { scene, world })
+        let stage = Stage::new(&scene)?;
+        let n = scene.threads.len();
+        let columns = [
+            ("time", "s"),
+            ("ms", "ms"),
+            ("max_tension", "N"),
+            ("max_elongation", ""),
+            ("clearance", "diameters"),
+            ("thread_clearance", "diameters"),
+            ("shape_clearance", "diameters"),
+            ("energy", "J"),
+            ("kinetic", "J"),
+            ("stretch", "J"),
+            ("bend", "J"),
+            ("twist", "J"),
+            ("gravity", "J"),
+            ("substeps", ""),
+            ("rejected", ""),
+            ("newton", ""),
+            ("contacts", ""),
+        ];
+        let mut runner = Runner {
+            world_start: stage.world.time(),
+            frame: 0,
+            phase: 0,
+            finished: false,
+            late: false,
+            probes: scene.probes.iter().map(Probe::new).collect(),
+            profiles: Vec::new(),
+            profiles_open: (0..scene.profiles.len()).collect(),
+            checks: scene.checks.iter().map(Check::new).collect(),
+            frames: Series { name: "frame".into(), columns: columns.map(|(n, u)| (n.to_owned(), u.to_owned())).to_vec(), rows: Vec::new() },
+            trajectory: Trajectory::default(),
+            saved: Vec::new(),
+            phases: Vec::new(),
+            incidents: Vec::new(),
+            work: WorkReport { converged: true, ..WorkReport::default() },
+            max_elongation: vec![0.0; n],
+            max_tension: vec![f64::NEG_INFINITY; n],
+            cpu: Vec::new(),
+            stuck: 0,
+            scene,
+            stage,
+        };
+        runner.trajectory.header = runner.header();
+        // The audit sweeps from the first state on.
+        let Runner { stage, .. } = &mut runner;
+        stage.judge.observe(stage.world.view());
+        runner.begin_phase()?;
+        runner.look();
+        runner.record();
+        Ok(runner)
     }
+
     /// Simulates one frame. Does nothing once the run is finished.
     pub fn step_frame(&mut self) -> Progress {
-        Progress { frame: 0, time: self.world.time(), fraction: 1.0, phase: String::new(), ms: 0.0, finished: true }
+        if !self.finished {
+            let (report, cpu, stuck) = self.simulate();
+            self.frame += 1;
+            self.stage.time = self.frame as f64 / self.scene.frame_rate;
+            self.stage.moment_passed();
+            self.take_note(&report, cpu);
+            self.look();
+            self.stuck = if stuck { self.stuck + 1 } else { 0 };
+            if self.stuck >= GIVE_UP {
+                self.incident(None, format!("given up: {GIVE_UP} frames in a row found no acceptable substep"));
+                self.late = true;
+                self.end_phase("given up");
+                self.finished = true;
+            } else {
+                self.end_phase_when_due();
+            }
+            if self.finished || self.frame.is_multiple_of(self.scene.record_every) {
+                self.record();
+            }
+        }
+        self.progress()
     }
+
+    /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.
+    fn simulate(&mut self) -> (FrameReport, f64, bool) {
+        let dt = 1.0 / self.scene.frame_rate;
+        let begin = self.frame as f64 * dt;
+        // What moves is sampled at every substep, so that its path does not depend on the frame rate.
+        let substep = self.stage.world.settings().substep;
+        let pieces = if self.stage.is_driven() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 };
+        let mut report = FrameReport { converged: true, ..FrameReport::default() };
+        let (mut cpu, mut stuck) = (Duration::ZERO, false);
+        for k in 1..=pieces {
+            let at = begin + dt * f64::from(k) / f64::from(pieces);
+            if let Err(e) = self.stage.drive(at) {
+                self.incident(None, e.to_string());
+            }
+            let Stage { world, judge, .. } = &mut self.stage;
+            let mut audited = Duration::ZERO;
+            let clock = ThreadTime::now();
+            let step = if judge.is_active() {
+                world.step_with(dt / f64::from(pieces), &mut |view| {
+                    let clock = ThreadTime::now();
+                    judge.observe(view);
+                    audited += clock.elapsed();
+                })
+            } else {
+                world.step(dt / f64::from(pieces))
+            };
+            cpu += clock.elapsed().saturating_sub(audited);
+            report.add(&step);
+            for incident in &step.incidents {
+                stuck |= matches!(incident.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite);
+                self.stage.incidents += 1;
+                self.incident(Some(&incident.kind), incident.kind.to_string());
+            }
+        }
+        (report, cpu.as_secs_f64(), stuck)
+    }
+
+    fn incident(&mut self, kind: Option<&IncidentKind>, message: String) {
+        let (key, time) = (kind.map(discriminant), self.stage.time);
+        if kind.is_none() {
+            self.stage.incidents += 1;
+        }
+        match self.incidents.iter_mut().find(|(k, r)| *k == key && (key.is_some() || r.message == message)) {
+            Some((_, r)) => {
+                r.count += 1;
+                r.last_s = time;
+            }
+            None => self.incidents.push((key, IncidentReport { message, count: 1, first_s: time, last_s: time })),
+        }
+    }
+
+    /// Sums up a frame.
+    fn take_note(&mut self, report: &FrameReport, cpu: f64) {
+        self.cpu.push(cpu);
+        let work = &mut self.work;
+        work.substeps += u64::from(report.substeps);
+        work.rejected += u64::from(report.rejected);
+        work.newton_iterations += u64::from(report.newton_iterations);
+        work.converged &= report.converged;
+        work.max_residual = work.max_residual.max(report.residual);
+        work.max_length_error = work.max_length_error.max(report.length_error);
+        work.max_contacts = work.max_contacts.max(report.contacts);
+        self.stage.last = report.clone();
+        self.stage.least = (lesser(self.stage.least.0, report.thread_clearance), lesser(self.stage.least.1, report.shape_clearance));
+        let mut energy = sutura::Energy::default();
+        let (mut tension, mut elongation) = (f64::NEG_INFINITY, 0.0_f64);
+        for (i, rod) in self.stage.rods().enumerate() {
+            let (t, e, own) = (rod.max_tension(), rod.max_elongation(), rod.energy());
+            self.max_tension[i] = self.max_tension[i].max(t);
+            self.max_elongation[i] = self.max_elongation[i].max(e);
+            (tension, elongation) = (tension.max(t), elongation.max(e));
+            energy.kinetic += own.kinetic;
+            energy.stretch += own.stretch;
+            energy.bend += own.bend;
+            energy.twist += own.twist;
+            energy.gravity += own.gravity;
+        }
+        let missing = |v: Option<f64>| v.unwrap_or(f64::NAN);
+        self.frames.rows.push(vec![
+            self.stage.time,
+            cpu * 1e3,
+            tension,
+            elongation,
+            missing(report.clearance()),
+            missing(report.thread_clearance),
+            missing(report.shape_clearance),
+            energy.total(),
+            energy.kinetic,
+            energy.stretch,
+            energy.bend,
+            energy.twist,
+            energy.gravity,
+            f64::from(report.substeps),
+            f64::from(report.rejected),
+            f64::from(report.newton_iterations),
+            f64::from(report.contacts),
+        ]);
+    }
+
+    /// Reads probes and checks at the present state.
+    fn look(&mut self) {
+        let time = self.stage.time;
+        for (i, probe) in self.probes.iter_mut().enumerate() {
+            let value = probe.read(&self.stage, time);
+            self.stage.probes[i] = value;
+        }
+        for check in &mut self.checks {
+            check.look(&self.stage, time, self.phase);
+        }
+        self.read_profiles(|m| matches!(m, Moment::Time(t) if time + 5e-7 >= t));
+    }
+
+    fn read_profiles(&mut self, due: impl Fn(Moment) -> bool) {
+        let (now, later): (Vec<usize>, Vec<usize>) = self.profiles_open.iter().partition(|i| due(self.scene.profiles[**i].moment));
+        self.profiles_open = later;
+        for i in now {
+            self.profiles.push(profile(&self.scene.profiles[i], &self.stage));
+        }
+    }
+
+    // ---- phases ----
+
+    /// Begins the phase at hand and every following one that ends at once.
+    fn begin_phase(&mut self) -> Result<(), SceneError> {
+        let Some(phase) = self.scene.phases.get(self.phase) else {
+            self.finished = true;
+            return Ok(());
+        };
+        self.stage.phase_begin = self.stage.time;
+        for step in &phase.actions {
+            self.stage.apply(step)?;
+        }
+        let time = self.stage.time;
+        self.phases.push(PhaseReport { name: phase.name.clone(), start_s: time, end_s: time, ended_by: String::new(), knots: Vec::new(), still: phase.still });
+        Ok(())
+    }
+
+    fn end_phase_when_due(&mut self) {
+        let Some(phase) = self.scene.phases.get(self.phase) else { return };
+        // Times are whole frames; rounding must not cost or add one.
+        let (time, slack) = (self.stage.time - self.stage.phase_begin, 0.5 / self.scene.frame_rate);
+        let ended = match &phase.end {
+            End::After(d) => (time + slack > *d).then_some("duration"),
+            End::When { condition, at_least, at_most, late } => {
+                let holds = match condition {
+                    Some(c) => c.holds(&self.stage),
+                    None => self.stage.is_done(),
+                };
+                if holds && time + slack > *at_least {
+                    Some(if condition.is_some() { "condition" } else { "motions done" })
+                } else if time + slack > *at_most {
+                    self.late |= *late != Late::Accept;
+                    self.finished |= *late == Late::Stop;
+                    Some("out of time")
+                } else {
+                    None
+                }
+            }
+        };
+        let Some(reason) = ended else { return };
+        self.end_phase(reason);
+        if self.finished {
+            return;
+        }
+        self.phase += 1;
+        if let Err(e) = self.begin_phase() {
+            for problem in e.problems {
+                self.incident(None, problem.to_string());
+            }
+            (self.late, self.finished) = (true, true);
+        }
+    }
+
+    fn end_phase(&mut self, reason: &str) {
+        let Some(phase) = self.scene.phases.get(self.phase) else { return };
+        let (index, time) = (self.phase, self.stage.time);
+        for check in &mut self.checks {
+            check.phase_ended(&self.stage, time, index);
+        }
+        let knots = phase.knots.iter().map(|t| (self.scene.threads[*t].name.clone(), self.stage.knot(*t))).collect();
+        if let Some(name) = &phase.save {
+            self.saved.push(SavedState { name: name.clone(), bytes: self.stage.save() });
+        }
+        if let Some(last) = self.phases.last_mut() {
+            (last.end_s, last.ended_by, last.knots) = (time, reason.into(), knots);
+        }
+        self.read_profiles(|m| m == Moment::PhaseEnd(index));
+    }
+
+    fn progress(&self) -> Progress {
+        let longest: Vec<f64> = self.scene.phases.iter().map(|p| p.longest().max(1e-9)).collect();
+        let total: f64 = longest.iter().sum();
+        let done: f64 = longest.iter().take(self.phase).sum();
+        let here = longest.get(self.phase).map_or(0.0, |l| (self.stage.time - self.stage.phase_begin).min(*l));
+        let phase = &self.scene.phases[self.phase.min(self.scene.phases.len() - 1)];
+        Progress {
+            frame: self.frame,
+            time: self.stage.time,
+            fraction: if self.finished { 1.0 } else { (done + here) / total },
+            phase: phase.name.clone(),
+            ms: self.cpu.last().map_or(0.0, |s| s * 1e3),
+            finished: self.finished,
+        }
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
     /// The world as it is now.
     pub fn world(&self) -> &World {
-        &self.world
+        &self.stage.world
     }
+
+    // ---- recording ----
+
     /// What the recording holds (for drawing while it runs).
     pub fn header(&self) -> Header {
-        Header::default()
+        let outline = |g: &Geometry| match g {
+            Geometry::Plane => ShapeOutline::Plane,
+            Geometry::Sphere { radius } => ShapeOutline::Sphere { radius: *radius },
+            Geometry::Capsule { radius, half_length } => ShapeOutline::Capsule { radius: *radius, half_length: *half_length },
+            Geometry::Cylinder { radius, half_length } => ShapeOutline::Cylinder { radius: *radius, half_length: *half_length },
+            Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
+            Geometry::Mesh { vertices, triangles } => {
+                ShapeOutline::Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles: triangles.clone() }
+            }
+        };
+        let thread = |t: &crate::scene::ThreadDef| Thread { name: t.name.clone(), radius: t.spec.radius, elements: t.spec.centerline.len() - 1 };
+        Header {
+            scene: self.scene.name.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            frame_rate: self.scene.frame_rate,
+            threads: self.scene.threads.iter().map(thread).collect(),
+            shapes: self.scene.shapes.iter().map(|s| Shape { name: s.name.clone(), outline: outline(&s.spec.geometry) }).collect(),
+            grips: self.scene.grips.clone(),
+        }
     }
     /// The world as a frame to draw.
     pub fn frame(&self) -> Frame {
-        Frame::default()
+        let v = |p: DVec3| p.as_vec3().to_array();
+        let q = |q: DQuat| q.as_quat().to_array();
+        Frame {
+            time: self.stage.time,
+            positions: self.stage.rods().map(|r| r.positions().iter().map(|p| v(*p)).collect()).collect(),
+            orientations: self.stage.rods().map(|r| r.orientations().iter().map(|o| q(*o)).collect()).collect(),
+            shapes: (0..self.scene.shapes.len())
+                .map(|i| {
+                    let pose = self.stage.shape_pose(i);
+                    (v(pose.position), q(pose.orientation))
+                })
+                .collect(),
+            grips: (0..self.scene.grips.len()).map(|i| self.stage.grip_pose(i).map(|p| v(p.position))).collect(),
+        }
     }
+    fn record(&mut self) {
+        let frame = self.frame();
+        self.trajectory.frames.push(frame);
+    }
+
+    // ---- the end ----
+
     /// Ends the run (early or not) and hands over what it found.
-    pub fn finish(self) -> Outcome {
-        Outcome::default()
+    pub fn finish(mut self) -> Outcome {
+        if !self.finished {
+            self.end_phase("stopped");
+        }
+        let time = self.stage.time;
+        for check in &mut self.checks {
+            check.run_ended(&self.stage, time);
+        }
+        self.read_profiles(|m| m == Moment::End);
+        let threads = self.thread_reports();
+        let solver = self.solver_report();
+        let (thread_thread, thread_shape) = self.stage.clearances();
+        let cpu_s: f64 = self.cpu.iter().sum();
+        let simulated_s = self.stage.world.time() - self.world_start;
+        let passages = {
+            let thread = |slot: usize| {
+                self.stage.threads.iter().position(|h| h.index() == slot).map_or(format!("thread {slot}"), |i| self.scene.threads[i].name.clone())
+            };
+            let shape =
+                |slot: usize| self.stage.shapes.iter().position(|h| h.index() == slot).map_or(format!("shape {slot}"), |i| self.scene.shapes[i].name.clone());
+            self.stage.judge.passages(thread, shape, self.world_start)
+        };
+        let checks: Vec<_> = self.checks.into_iter().map(Check::finish).collect();
+        let (mut probes, mut series) = (Vec::new(), vec![self.frames]);
+        for probe in self.probes {
+            let (reports, table) = probe.finish();
+            probes.extend(reports);
+            series.push(table);
+        }
+        series.extend(self.profiles);
+        let report = Report {
+            scene: self.scene.name.clone(),
+            title: self.scene.title.clone(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            solver,
+            simulated_s,
+            cpu_s,
+            real_time_factor: ratio(simulated_s, cpu_s),
+            worst_second_real_time_factor: worst_second(&self.cpu, self.scene.frame_rate),
+            ms_per_frame: frame_times(&self.cpu),
+            frames: self.frame,
+            threads,
+            min_clearance: Clearance { thread_thread, thread_shape, least: lesser(thread_thread, thread_shape) },
+            passes_through: self.stage.judge.passes_through(),
+            passages,
+            probes,
+            passed: checks.iter().all(|c| c.passed) && !self.late,
+            checks,
+            incidents: self.incidents.into_iter().map(|(_, r)| r).collect(),
+            state_hash: format!("{:016x}", self.stage.world.state_hash()),
+            work: self.work,
+            phases: self.phases,
+        };
+        Outcome { report, series, trajectory: self.trajectory, saved: self.saved }
+    }
+
+    fn thread_reports(&self) -> Vec<ThreadReport> {
+        let one = |(i, def): (usize, &crate::scene::ThreadDef)| {
+            let handle = self.stage.threads[i];
+            let audited = self.stage.judge.max_elongation(handle.index());
+            ThreadReport {
+                name: def.name.clone(),
+                elements: def.spec.centerline.len() - 1,
+                length_m: self.stage.world.rod(handle).map_or(0.0, |r| r.rest_length()),
+                radius_m: def.spec.radius,
+                max_elongation: audited.unwrap_or(0.0).max(self.max_elongation[i]),
+                max_tension_n: if self.max_tension[i].is_finite() { self.max_tension[i] } else { 0.0 },
+                knot: def.knot.then(|| self.stage.knot(i)),
+            }
+        };
+        self.scene.threads.iter().enumerate().map(one).collect()
+    }
+
+    fn solver_report(&self) -> SolverReport {
+        let s = self.stage.world.settings();
+        SolverReport {
+            name: "direct".into(),
+            frame_rate: self.scene.frame_rate,
+            substep_s: s.substep,
+            newton_max: s.newton_max,
+            tolerance: s.tolerance,
+            linear_damping: s.linear_damping,
+            angular_damping: s.angular_damping,
+            gravity: s.gravity.to_array(),
+        }
+    }
+}
+
+/// Simulated over CPU time; zero when nothing ran, since JSON has no infinity.
+fn ratio(simulated: f64, cpu: f64) -> f64 {
+    if cpu > 0.0 { simulated / cpu } else { 0.0 }
+}
+
+/// Least real-time factor over any second of frames, or over all when there are fewer.
+fn worst_second(cpu: &[f64], frame_rate: f64) -> f64 {
+    let n = (frame_rate.round() as usize).clamp(1, cpu.len().max(1));
+    let worst = cpu.windows(n).map(|w| w.iter().sum::<f64>()).fold(0.0, f64::max);
+    ratio(n as f64 / frame_rate, worst)
+}
+
+fn frame_times(cpu: &[f64]) -> FrameTimes {
+    let mut ms: Vec<f64> = cpu.iter().map(|s| s * 1e3).collect();
+    ms.sort_by(f64::total_cmp);
+    // The nearest rank: the least value that at least this part of the frames does not exceed.
+    let rank = |part: f64| ms.get(((part * ms.len() as f64).ceil() as usize).saturating_sub(1)).copied().unwrap_or(0.0);
+    FrameTimes { median: rank(0.5), p99: rank(0.99), max: ms.last().copied().unwrap_or(0.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_frames() {
+        let cpu: Vec<f64> = (1..=200).map(|i| f64::from(i) * 1e-3).collect();
+        let t = frame_times(&cpu);
+        assert!((t.median - 100.0).abs() < 1e-9 && (t.p99 - 198.0).abs() < 1e-9 && (t.max - 200.0).abs() < 1e-9);
+        assert_eq!(frame_times(&[]), FrameTimes::default());
+        // The last 60 frames take 10.23 s for one simulated second.
+        let slowest: f64 = cpu[140..].iter().sum();
+        assert!((worst_second(&cpu, 60.0) - 1.0 / slowest).abs() < 1e-12);
+        assert!((worst_second(&cpu[..2], 60.0) - (2.0 / 60.0) / 3e-3).abs() < 1e-9);
     }
 }

@@ -1,17 +1,262 @@
-//! A scene, read and checked.
+//! A scene, read and checked: what there is, what happens, what is watched.
 
+use crate::doc::Location;
 use crate::error::SceneError;
-use std::path::Path;
+use crate::expr::{At, Expr, Read};
+use crate::motion::Plan;
+use crate::units::Unit;
+use std::path::{Path, PathBuf};
+use sutura::glam::DVec3;
+use sutura::{Friction, Hold, Place, RodSpec, Settings, ShapeSpec};
 
 /// A scene, read from a file and checked.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    name: String,
-    title: String,
-    description: String,
-    frame_rate: f64,
-    duration: Option<f64>,
-    stills: Vec<f64>,
+    pub(crate) name: String,
+    pub(crate) title: String,
+    pub(crate) description: String,
+    pub(crate) frame_rate: f64,
+    pub(crate) stills: Vec<f64>,
+    pub(crate) camera: Option<Camera>,
+    /// Every how many frames one is recorded.
+    pub(crate) record_every: u64,
+    pub(crate) audit: bool,
+    pub(crate) seed: u64,
+    pub(crate) settings: Settings,
+    pub(crate) frictions: Vec<(u32, u32, Friction, Location)>,
+    pub(crate) solver_location: Location,
+    pub(crate) threads: Vec<ThreadDef>,
+    pub(crate) shapes: Vec<ShapeDef>,
+    pub(crate) grips: Vec<String>,
+    pub(crate) loads: Vec<String>,
+    pub(crate) start: Option<(PathBuf, Location)>,
+    pub(crate) initial: Vec<Step>,
+    pub(crate) phases: Vec<Phase>,
+    pub(crate) probes: Vec<ProbeDef>,
+    pub(crate) profiles: Vec<ProfileDef>,
+    pub(crate) checks: Vec<CheckDef>,
+}
+
+/// Where a still picture is looked at from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Point in the middle of the picture \[m\]; `None`: the middle of what is there.
+    pub look_at: Option<DVec3>,
+    /// From the point toward the camera, a unit vector.
+    pub from: DVec3,
+    /// Upward in the picture, a unit vector.
+    pub up: DVec3,
+    /// Width of what is seen at the point \[m\]; `None`: all of it.
+    pub width: Option<f64>,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ThreadDef {
+    pub name: String,
+    pub spec: RodSpec,
+    pub location: Location,
+    /// Whether the final knot is recognised for the report.
+    pub knot: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ShapeDef {
+    pub name: String,
+    pub spec: ShapeSpec,
+    pub location: Location,
+}
+
+/// A thing that moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Mover {
+    Grip(usize),
+    Shape(usize),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Action {
+    Take {
+        grip: usize,
+        thread: usize,
+        place: Place,
+        hold: Hold,
+        ramp: f64,
+    },
+    LetGo {
+        grip: usize,
+    },
+    Move {
+        what: Mover,
+        plan: Plan,
+    },
+    Rest {
+        what: Mover,
+    },
+    Push {
+        what: Mover,
+        direction: DVec3,
+        force: f64,
+        speed_limit: f64,
+    },
+    Load {
+        load: usize,
+        thread: usize,
+        kind: LoadDef,
+        ramp: f64,
+    },
+    Unload {
+        load: usize,
+    },
+    /// Remembers where the thread enters its knot, so that `slip` counts from here.
+    Mark {
+        thread: usize,
+    },
+    Gravity {
+        value: DVec3,
+        ramp: f64,
+    },
+    Solver {
+        linear_damping: Option<f64>,
+        angular_damping: Option<f64>,
+        substep: Option<f64>,
+        newton_max: Option<u32>,
+        tolerance: Option<f64>,
+    },
+    Friction {
+        a: u32,
+        b: u32,
+        friction: Friction,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum LoadDef {
+    Point { place: Place, force: DVec3, torque: DVec3 },
+    Uniform { force_per_length: DVec3 },
+    Mass { place: Place, mass: f64, inertia: DVec3 },
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Step {
+    pub action: Action,
+    pub location: Location,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct Phase {
+    pub name: String,
+    pub actions: Vec<Step>,
+    pub end: End,
+    pub save: Option<String>,
+    /// Threads whose knot is recognised at its end.
+    pub knots: Vec<usize>,
+    pub still: bool,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum End {
+    After(f64),
+    /// When the condition holds, or the motions and ramps begun in the phase are done (`None`).
+    When {
+        condition: Option<Expr>,
+        at_least: f64,
+        at_most: f64,
+        late: Late,
+    },
+}
+
+/// What happens when a condition does not come true in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Late {
+    /// The run fails and ends.
+    Stop,
+    /// The run fails, the next phase begins.
+    Fail,
+    /// The next phase begins.
+    Accept,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ProbeDef {
+    pub name: String,
+    pub what: Expr,
+    /// Unit of the numbers; `None` is SI.
+    pub unit: Option<(String, Unit)>,
+    pub every: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ProfileDef {
+    pub name: String,
+    pub thread: usize,
+    pub what: Vec<(&'static str, Read, &'static [&'static str], &'static str)>,
+    pub moment: Moment,
+}
+
+/// When something is read once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Moment {
+    End,
+    Time(f64),
+    PhaseEnd(usize),
+}
+
+/// When a check looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Span {
+    Once(Moment),
+    /// From a time to a time \[s\].
+    Window(f64, f64),
+    During(usize),
+}
+
+/// What is made of the values seen in a span.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Take {
+    /// Every one must pass; the worst is shown.
+    Every,
+    First,
+    Last,
+    Max,
+    Min,
+    Mean,
+    /// Last less first.
+    Change,
+    /// Greatest less least.
+    Range,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) enum Wanted {
+    True,
+    Text(String),
+    /// Value and allowed difference.
+    Near(f64, f64),
+    Between(f64, f64),
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct CheckDef {
+    pub name: String,
+    pub that: Expr,
+    pub wanted: Wanted,
+    /// In words.
+    pub words: String,
+    pub unit: Option<(String, Unit)>,
+    pub span: Span,
+    pub take: Take,
+}
+
+/// Place of the engine for a place of the scene on a thread of rest length `length`.
+pub(crate) fn engine_place(at: At, length: f64) -> Place {
+    match at {
+        At::Start => Place::Start,
+        At::Middle => Place::Arc(0.5 * length),
+        At::End => Place::End,
+        At::Particle(i) => Place::Particle(i),
+        At::Element(i) => Place::Element(i),
+        At::Arc(s) => Place::Arc(s),
+    }
 }
 
 impl Scene {
@@ -21,8 +266,8 @@ impl Scene {
         Self::parse(&text, &path.display().to_string())
     }
     /// Reads the text of a scene; `file_name` stands in messages, and its folder is where paths start.
-    pub fn parse(_text: &str, file_name: &str) -> Result<Scene, SceneError> {
-        Err(SceneError::of_file(file_name, "not readable yet"))
+    pub fn parse(text: &str, file_name: &str) -> Result<Scene, SceneError> {
+        crate::load::scene(text, file_name)
     }
     /// Name: the file name without its ending.
     pub fn name(&self) -> &str {
@@ -40,12 +285,37 @@ impl Scene {
     pub fn frame_rate(&self) -> f64 {
         self.frame_rate
     }
-    /// Longest simulated time that it can take \[s\] when every phase has a bound; shorter when conditions end phases early.
+    /// Longest simulated time that it can take \[s\], as far as it is known beforehand; shorter when conditions end phases early.
     pub fn duration(&self) -> Option<f64> {
-        self.duration
+        Some(self.phases.iter().map(Phase::longest).sum())
     }
-    /// Times of which stills are wanted \[s\]; times beyond the end mean the end.
+    /// Times of which stills are wanted \[s\]; times beyond the end mean the end. Phases may ask for one at their end, which the
+    /// report marks.
     pub fn stills(&self) -> &[f64] {
         &self.stills
+    }
+    /// How stills are looked at, when the scene says so.
+    pub fn camera(&self) -> Option<&Camera> {
+        self.camera.as_ref()
+    }
+}
+
+impl Phase {
+    /// Longest time that it can take \[s\].
+    pub fn longest(&self) -> f64 {
+        match &self.end {
+            End::After(d) => *d,
+            End::When { condition: None, at_least, .. } => self.motions().max(*at_least),
+            End::When { at_most, .. } => *at_most,
+        }
+    }
+    /// Time that its motions and ramps take, as far as known beforehand.
+    fn motions(&self) -> f64 {
+        let of = |step: &Step| match &step.action {
+            Action::Move { plan, .. } => plan.least_duration(),
+            Action::Load { ramp, .. } | Action::Gravity { ramp, .. } | Action::Take { ramp, .. } => *ramp,
+            _ => 0.0,
+        };
+        self.actions.iter().map(of).fold(0.0, f64::max)
     }
 }

@@ -1,0 +1,85 @@
+//! The only place that asks the engine's audit and knot recognition.
+
+use crate::report::KnotReport;
+use sutura::audit::{Audit, Pair};
+use sutura::glam::DVec3;
+use sutura::knot::{self, Ends, Entries};
+use sutura::{RodView, View};
+
+/// Watches accepted states when a scene wants it.
+pub struct Judge {
+    audit: Option<Audit>,
+}
+
+impl Judge {
+    pub fn new(active: bool) -> Self {
+        Judge { audit: active.then(Audit::new) }
+    }
+    pub fn observe(&mut self, view: View<'_>) {
+        if let Some(audit) = &mut self.audit {
+            audit.observe(view);
+        }
+    }
+    pub fn is_active(&self) -> bool {
+        self.audit.is_some()
+    }
+    pub fn passes_through(&self) -> Option<bool> {
+        self.audit.as_ref().map(|a| a.report().passes_through)
+    }
+    /// Least clearances so far: thread to thread, thread to shape.
+    pub fn clearances(&self) -> Option<(Option<f64>, Option<f64>)> {
+        self.audit.as_ref().map(|a| (a.report().thread_clearance, a.report().shape_clearance))
+    }
+    /// Largest |elongation| so far by slot of the thread.
+    pub fn max_elongation(&self, slot: usize) -> Option<f64> {
+        self.audit.as_ref()?.report().max_elongation.iter().find(|e| e.0 == slot).map(|e| e.1)
+    }
+    /// The first passages in words.
+    pub fn passages(&self, thread: impl Fn(usize) -> String, shape: impl Fn(usize) -> String, start: f64) -> Vec<String> {
+        let Some(audit) = &self.audit else { return Vec::new() };
+        let words = |c: &sutura::audit::Crossing| {
+            let what = match c.what {
+                Pair::Threads { a, b } => format!("{} element {} and {} element {}", thread(a.0), a.1, thread(b.0), b.1),
+                Pair::Shape { thread: t, shape: s } => format!("{} element {} and {}", thread(t.0), t.1, shape(s)),
+            };
+            format!("{:.6} s: {what}", c.time - start)
+        };
+        audit.report().crossings.iter().take(20).map(words).collect()
+    }
+}
+
+/// Recognizes the knot of a thread. `held`: the arc lengths at which it is held; when both halves are, the piece between the outermost
+/// two is closed along rays away from its middle, otherwise the ends count as free.
+pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
+    let points = rod.positions();
+    let length = rod.rest_length();
+    let (first, last) = (held.iter().copied().fold(f64::INFINITY, f64::min), held.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    let recognition = if first < 0.5 * length && last > 0.5 * length {
+        let arc = |i: usize| rod.arc(i);
+        // A little tolerance, since arc lengths are sums.
+        let inside: Vec<DVec3> = (0..points.len()).filter(|i| arc(*i) >= first - 1e-9 * length && arc(*i) <= last + 1e-9 * length).map(|i| points[i]).collect();
+        let middle = inside.iter().sum::<DVec3>() / inside.len().max(1) as f64;
+        match (inside.first(), inside.last()) {
+            (Some(a), Some(b)) => knot::recognize(&inside, Ends::Held { start: *a - middle, end: *b - middle }, seed),
+            _ => knot::recognize(points, Ends::Free, seed),
+        }
+    } else {
+        knot::recognize(points, Ends::Free, seed)
+    };
+    let (tried, agreed) = if recognition.closures_total > 1 {
+        (recognition.closures_total, recognition.closures_agreed)
+    } else {
+        (recognition.projections_total, recognition.projections_agreed)
+    };
+    KnotReport { name: recognition.knot.name().into(), determinant: recognition.determinant, signature: i64::from(recognition.signature), tried, agreed }
+}
+
+/// Writhe of a thread in turns, its ends joined far away along the tangents there.
+pub fn writhe(rod: &RodView<'_>) -> f64 {
+    knot::writhe(rod.positions(), false)
+}
+
+/// Where a thread enters its knot.
+pub fn entries(rod: &RodView<'_>) -> Option<Entries> {
+    knot::entries(rod.positions(), rod.rest_lengths(), rod.radius())
+}

@@ -35,16 +35,18 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     while out.iterations < settings.newton_max {
         out.iterations += 1;
         row::thread::zones(scratch);
-        if !factor(model, state, scratch, h, Hessian::Exact) {
-            factor(model, state, scratch, h, Hessian::Positive);
+        let first = out.iterations == 1;
+        if !factor(model, state, scratch, h, Hessian::Exact, first) {
+            factor(model, state, scratch, h, Hessian::Positive, first);
         }
         let blocks = core::mem::take(&mut scratch.rods);
         scratch.step.copy_from_slice(&scratch.rhs);
         for (rod, zone) in &blocks {
             scratch.system.solve(rod.clone(), zone, &mut scratch.step);
+            scratch.torque_correction.apply(&scratch.system, rod, zone, &scratch.torque, &mut scratch.step);
         }
         scratch.rods = blocks;
-        row::couple(model, state, scratch);
+        row::thread::couple(model, state, scratch);
         let scale = limit(model, state, scratch);
         apply(model, state, scratch, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
@@ -54,7 +56,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             return out;
         }
         let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 10.0 * settings.tolerance);
-        if scale >= 1.0 && settled && !row::thread::extend(model, state, scratch) {
+        if scale >= 1.0 && settled && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
             out.converged = true;
             break;
         }
@@ -72,9 +74,9 @@ enum Hessian {
 }
 
 /// Assembles and factors. False when a pivot is not positive.
-fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian) -> bool {
+fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
-    row::shape::assemble(model, state, scratch, h);
+    row::shape::assemble(model, state, scratch, first);
     restrict(state, scratch);
     let Scratch { system, rods, .. } = scratch;
     let mut positive = true;
@@ -225,7 +227,7 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
         }
     }
     assemble(model, state, scratch, h, Hessian::Positive);
-    row::shape::assemble(model, state, scratch, h);
+    row::shape::assemble(model, state, scratch, false);
     row::thread::add_forces(scratch);
 }
 

@@ -62,7 +62,33 @@ impl Default for Settings {
 }
 
 /// Normal stiffness of a contact over E times the radius (the scale of Hertz stiffness of two crossed cylinders).
-pub(crate) const CONTACT_STIFFNESS: f64 = 1.0;
+pub(crate) const CONTACT_STIFFNESS: f64 = 4.0;
+
+/// How far beyond the predicted motion candidates are sought, in radii.
+pub(crate) const REACH: f64 = 1.5;
+/// Overlap, in sums of radii, beyond which a substep that brought two things nearer is rejected. The bar of the sample scenes is 0.05.
+pub(crate) const OVERLAP: f64 = 0.04;
+/// Approach within a substep that does not count as approach, in sums of radii: rounding of the contact solve.
+pub(crate) const OVERLAP_DRIFT: f64 = 2e-4;
+/// Distance of centerlines, in sums of radii, that no motion may go below on its way.
+pub(crate) const PASS: f64 = 0.3;
+
+/// Distance kept between centerlines beyond the sum of radii, in sums of radii; half of the overlap tolerance in reserve.
+pub(crate) const KEEP: f64 = 0.02;
+/// How much nearer than that Newton's answer may bring two pieces before another contact is added.
+pub(crate) const SLACK: f64 = 0.03;
+/// Gap beyond the predicted motion within which contacts are set up, in radii.
+pub(crate) const MARGIN: f64 = 0.3;
+/// Gap after the step without contact forces beyond which a contact without force is left out of the solve, in radii.
+pub(crate) const PRUNE: f64 = 0.5;
+/// Squared cosine beyond which two elements count as parallel (17 degrees).
+pub(crate) const PARALLEL: f64 = 0.914;
+/// Part of an old overlap that may remain after a substep.
+pub(crate) const RECOVER: f64 = 0.8;
+/// Residual of the contact solve, in radii.
+pub(crate) const CONTACT_TOLERANCE: f64 = 2e-3;
+/// Weight of the contact solve's proximal term.
+pub(crate) const PROXIMAL: f64 = 0.1;
 
 impl Settings {
     pub(crate) fn validate(&self) -> Result<(), Error> {

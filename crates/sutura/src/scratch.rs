@@ -1,7 +1,9 @@
 //! Working memory of the step. May be dropped between steps without changing one bit of what follows.
 
 use crate::collide::Candidates;
+use crate::math::Pose;
 use crate::rod::factor::System;
+use crate::rod::torque::TorqueCorrection;
 use crate::row::Rows;
 use crate::state::State;
 use core::ops::Range;
@@ -53,18 +55,22 @@ pub(crate) struct Scratch {
     /// Start of the substep.
     pub start: Vec<DVec3>,
     pub start_frame: Vec<DQuat>,
+    pub start_shape_pose: Vec<Pose>,
     /// Joint angles at the start, for Kelvin-Voigt.
     pub start_angle: Vec<DVec3>,
     /// Outside force and torque on particles and frames.
     pub force: Vec<DVec3>,
     pub torque: Vec<DVec3>,
 
+    /// Radius of the thread of each element.
+    pub radius: Vec<f64>,
     /// One per node: particle, frame, particle, ...
     pub freedom: Vec<Freedom>,
     pub joint_on: Vec<bool>,
     pub clamps: Vec<ClampJoint>,
 
     pub system: System,
+    pub torque_correction: TorqueCorrection,
     /// Right side, then solution, one per node.
     pub rhs: Vec<DVec3>,
     pub step: Vec<DVec3>,
@@ -95,6 +101,8 @@ impl Scratch {
         self.rhs.resize(2 * n, DVec3::ZERO);
         self.step.resize(2 * n, DVec3::ZERO);
         self.tension.resize(n, 0.0);
+        self.radius.clear();
+        self.radius.extend(model.rod_of.iter().map(|r| model.rods.at(*r).map_or(0.0, |r| r.radius)));
         self.rods.clear();
         for (_, rod) in model.rods.iter() {
             let blocks = rod.particles();

@@ -174,7 +174,7 @@ variants!(LoadKind {
 });
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
-structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, sliding });
+structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
 structure!(ShapeContact { shape, element, s, normal, normal_force, friction, sliding });
 structure!(GripState {
     rod,

@@ -57,7 +57,7 @@ fn advance(
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
     row::thread::begin(model, state, scratch, h);
-    row::shape::begin(model, state, scratch, h);
+    row::shape::begin(model, state, scratch);
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
     let verdict = if !outcome.finite {
@@ -173,6 +173,7 @@ fn smoothstep(u: f64) -> f64 {
 fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, t: f64, h: f64) {
     scratch.start.copy_from_slice(&state.position);
     scratch.start_frame.copy_from_slice(&state.orientation);
+    scratch.start_shape_pose.clone_from(&state.shape_pose);
     scratch.freedom.fill(Freedom::Free);
     scratch.joint_on.fill(true);
     scratch.clamps.clear();
@@ -287,7 +288,7 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
         }
     }
     yield_plastic(model, state);
-    row::thread::finish(model, state, scratch);
+    row::thread::finish(state, scratch);
     row::shape::finish(model, state, scratch);
     reactions(model, state, scratch, h);
     state.last_h = h;

@@ -1,11 +1,184 @@
-//! Closest points and times of impact.
+//! Which pieces may touch, and whether a substep's motion was allowed. Knows positions only; what contacts do is in `row`.
+
+pub(crate) mod segment;
+mod shape;
+mod tree;
+
+pub(crate) use shape::Collider;
+
 use crate::model::Model;
+use crate::params;
 use crate::scratch::Scratch;
 use crate::state::State;
-pub(crate) struct Collider;
-impl Collider { pub fn new(_: &crate::Geometry) -> Result<Self, crate::Error> { Ok(Collider) } }
+use glam::DVec3;
+use tree::{Bounds, Tree};
+
+/// Pairs that may touch in the substep, in array order.
 #[derive(Default)]
-pub(crate) struct Candidates;
-pub(crate) struct Clearance { pub thread: Option<f64>, pub shape: Option<f64> }
-pub(crate) fn detect(_: &Model, _: &State, _: &mut Scratch) {}
-pub(crate) fn sweep(_: &Model, _: &State, _: &mut Scratch) -> Result<Clearance, &'static str> { Ok(Clearance { thread: None, shape: None }) }
+pub(crate) struct Candidates {
+    /// Elements `a < b`.
+    pub threads: Vec<(u32, u32)>,
+    /// Shape slot and element.
+    pub shapes: Vec<(u32, u32)>,
+    /// Rest arc of each particle from the start of its rod \[m\].
+    pub arc: Vec<f64>,
+    tree: Tree,
+}
+
+/// Least clearances of an accepted state, in thread diameters.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Clearance {
+    pub thread: Option<f64>,
+    pub shape: Option<f64>,
+}
+
+impl Candidates {
+    /// Radius of the thread of an element.
+    #[inline]
+    fn radius(model: &Model, e: usize) -> f64 {
+        model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius)
+    }
+
+    /// Whether two elements are so near along one thread that their overlap is bending, not contact: less than half a turn of the
+    /// thread's own radius.
+    fn neighbors(&self, model: &Model, a: usize, b: usize) -> bool {
+        model.rod_of[a] == model.rod_of[b] && self.arc[b] - self.arc[a + 1] < core::f64::consts::PI * Self::radius(model, a)
+    }
+}
+
+/// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
+/// room for what Newton will add.
+pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
+    let Scratch { candidates, start, .. } = scratch;
+    let Candidates { threads, shapes, arc, tree } = candidates;
+    arc.clear();
+    for e in 0..model.mass.len() {
+        let fresh = e == 0 || !model.is_element(e - 1);
+        let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
+        arc.push(s);
+    }
+    let reach = params::REACH;
+    tree.fill(model.mass.len(), |e| {
+        if !model.is_element(e) {
+            return Bounds::EMPTY;
+        }
+        let grow = Candidates::radius(model, e) * (1.0 + reach);
+        Bounds::of(&[start[e], start[e + 1], state.position[e], state.position[e + 1]], grow)
+    });
+    threads.clear();
+    tree.pairs(|a, b| threads.push((a as u32, b as u32)));
+    threads.sort_unstable();
+    shapes.clear();
+    for (slot, shape) in model.shapes.iter() {
+        let (lo, hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
+        tree.overlapping(&Bounds { lo, hi }, |e| shapes.push((slot, e as u32)));
+    }
+    shapes.sort_unstable();
+    let mut list = core::mem::take(&mut candidates.threads);
+    list.retain(|(a, b)| !candidates.neighbors(model, *a as usize, *b as usize));
+    candidates.threads = list;
+}
+
+/// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and still approach,
+/// nothing may have passed through.
+pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Result<Clearance, &'static str> {
+    if outran(model, state, scratch) {
+        detect(model, state, scratch);
+    }
+    let mut clearance = Clearance::default();
+    let Scratch { candidates, start, start_shape_pose, .. } = scratch;
+    let x = &state.position;
+    for (a, b) in &candidates.threads {
+        let (a, b) = (*a as usize, *b as usize);
+        let sum = Candidates::radius(model, a) + Candidates::radius(model, b);
+        let moved = relative_motion(start, x, a, b);
+        // Cheap bound from the middles before the exact distance.
+        let reach = 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
+        let apart = 0.5 * (x[a] + x[a + 1] - x[b] - x[b + 1]).length() - reach;
+        if apart - moved > 1.5 * sum {
+            continue;
+        }
+        let now = segment::closest(x[a], x[a + 1], x[b], x[b + 1]).apart.length();
+        let gap = (now - sum) / sum;
+        clearance.thread = Some(clearance.thread.map_or(gap, |c| c.min(gap)));
+        if now >= sum && moved < 0.5 * sum {
+            continue;
+        }
+        let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]).apart.length();
+        if gap < -params::OVERLAP && now < before - params::OVERLAP_DRIFT * sum {
+            return Err("threads overlap");
+        }
+        if before - moved < params::PASS * sum && passes(start, x, a, b, params::PASS * sum.min(before)) {
+            return Err("threads would pass through each other");
+        }
+    }
+    for (slot, e) in &candidates.shapes {
+        let (k, e) = (*slot as usize, *e as usize);
+        let shape = model.shapes.at(*slot).expect("candidate shapes live");
+        let r = Candidates::radius(model, e);
+        let side = |p: DVec3, pose| shape.collider.distance(pose, p, None);
+        for (i, s) in [(e, 0.0), (e, 0.5), (e + 1, 1.0)] {
+            let at = |x: &[DVec3]| if s == 0.5 { (x[e] + x[e + 1]) * 0.5 } else { x[i] };
+            let before = side(at(start), &start_shape_pose[k]);
+            let now = shape.collider.distance(&state.shape_pose[k], at(x), Some(before.normal));
+            let gap = (now.value - r) / (2.0 * r);
+            clearance.shape = Some(clearance.shape.map_or(gap, |c| c.min(gap)));
+            if gap < -params::OVERLAP && now.value < before.value - 2.0 * r * params::OVERLAP_DRIFT {
+                return Err("a thread overlaps a shape");
+            }
+            // A thin shape can be jumped over: look along the way.
+            let way = (at(x) - at(start)).length();
+            if way > r {
+                let steps = (2.0 * way / r).ceil().min(200.0);
+                for j in 1..steps as u32 {
+                    let u = f64::from(j) / steps;
+                    let pose = start_shape_pose[k].interpolate(&state.shape_pose[k], u);
+                    let between = shape.collider.distance(&pose, at(start).lerp(at(x), u), Some(before.normal));
+                    if between.value < 0.5 * r && between.value < before.value {
+                        return Err("a thread would pass through a shape");
+                    }
+                }
+            }
+        }
+    }
+    Ok(clearance)
+}
+
+/// Whether the iterate left the boxes in which candidates were sought.
+fn outran(model: &Model, state: &State, scratch: &Scratch) -> bool {
+    (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
+        let b = scratch.candidates.tree.leaf(e);
+        let keep = Candidates::radius(model, e) * 1.1;
+        [state.position[e], state.position[e + 1]].iter().any(|p| {
+            let (lo, hi) = (b.lo + DVec3::splat(keep), b.hi - DVec3::splat(keep));
+            p.cmplt(lo).any() || p.cmpgt(hi).any()
+        })
+    })
+}
+
+/// Largest relative move of two points of the two elements.
+#[inline]
+pub(crate) fn relative_motion(from: &[DVec3], to: &[DVec3], a: usize, b: usize) -> f64 {
+    let d = |i: usize| to[i] - from[i];
+    let (a0, a1, b0, b1) = (d(a), d(a + 1), d(b), d(b + 1));
+    (a0 - b0).length_squared().max((a0 - b1).length_squared()).max((a1 - b0).length_squared()).max((a1 - b1).length_squared()).sqrt()
+}
+
+/// Whether the centerlines come nearer than `least` on the straight way between two states (conservative advancement: at distance d no
+/// contact can come before d / relative motion).
+fn passes(from: &[DVec3], to: &[DVec3], a: usize, b: usize, least: f64) -> bool {
+    let moved = relative_motion(from, to, a, b);
+    let mut u = 0.0;
+    for _ in 0..200 {
+        let p = |i: usize| from[i].lerp(to[i], u);
+        let d = segment::closest(p(a), p(a + 1), p(b), p(b + 1)).apart.length();
+        if d < least {
+            return true;
+        }
+        u += ((d - 0.9 * least) / moved).max(1e-3);
+        if u >= 1.0 {
+            return false;
+        }
+    }
+    true
+}

@@ -96,7 +96,7 @@ impl Block {
         Columns { x: self.xx * c.x + self.xt * c.t, t: self.tx * c.x + self.tt * c.t }
     }
     #[inline(always)]
-    fn mul(&self, b: &Block) -> Block {
+    pub fn mul(&self, b: &Block) -> Block {
         Block {
             xx: self.xx * b.xx + self.xt * b.tx,
             xt: self.xx * b.xt + self.xt * b.tt,
@@ -105,18 +105,14 @@ impl Block {
         }
     }
     #[inline(always)]
-    fn transpose(&self) -> Block {
+    pub fn transpose(&self) -> Block {
         Block { xx: self.xx.transpose(), xt: self.tx.transpose(), tx: self.xt.transpose(), tt: self.tt.transpose() }
+    }
+    pub fn negated(&self) -> Block {
+        Block { xx: -self.xx, xt: -self.xt, tx: -self.tx, tt: -self.tt }
     }
     fn add(&self, b: &Block) -> Block {
         Block { xx: self.xx + b.xx, xt: self.xt + b.xt, tx: self.tx + b.tx, tt: self.tt + b.tt }
-    }
-}
-
-impl Columns {
-    #[inline(always)]
-    pub fn add(&self, o: &Columns) -> Columns {
-        Columns { x: self.x + o.x, t: self.t + o.t }
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod factor;
 pub(crate) mod strain;
+pub(crate) mod torque;
 
 use crate::model::{Model, rod::RodModel};
 use crate::state::State;

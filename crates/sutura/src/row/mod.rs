@@ -1,11 +1,19 @@
-//! Contacts: thread on thread and thread on shape.
+//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`], local).
+
+pub(crate) mod cone;
 pub(crate) mod shape;
 pub(crate) mod thread;
-use crate::model::Model;
-use crate::scratch::Scratch;
-use crate::state::State;
 
+/// The rows of one substep and the memory of their solver.
 #[derive(Default)]
-pub(crate) struct Rows;
-impl Rows { pub fn is_empty(&self) -> bool { true } }
-pub(crate) fn couple(_: &Model, _: &State, _: &mut Scratch) {}
+pub(crate) struct Rows {
+    pub shapes: Vec<shape::ShapeRow>,
+    pub threads: Vec<thread::ThreadRow>,
+    pub solver: thread::Coupling,
+}
+
+impl Rows {
+    pub fn is_empty(&self) -> bool {
+        self.shapes.is_empty() && self.threads.is_empty()
+    }
+}

@@ -1,10 +1,512 @@
-//! stub
+//! Contact of thread with thread, solved in the threads' own compliance.
+//!
+//! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two pieces too near,
+//! another row is added at their present closest places. With W the inverse of the rods' Newton matrix and G the rows' Jacobian,
+//! `S = G W G^T` is the compliance between contacts. Newton's step without contact, then the contact forces from S ([`cone`]), then the
+//! step that they cause. (A contact sweep that moves particles by their own inertia, m / h^2, cannot hold: the rod behind them is 10^5
+//! times stiffer.)
+//!
+//! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the next substep.
+
+use crate::collide::{relative_motion, segment};
+use crate::math::log;
 use crate::model::Model;
+use crate::params;
+use crate::rod::factor::{Block, Columns};
+use crate::row::cone::{Cone, Limits};
 use crate::scratch::Scratch;
-use crate::state::State;
-pub(crate) fn begin(_: &Model, _: &mut State, _: &mut Scratch, _h: f64) {}
-pub(crate) fn finish(_: &Model, _: &mut State, _: &mut Scratch) {}
-pub(crate) fn zones(_: &mut Scratch) {}
-pub(crate) fn add_forces(_: &mut Scratch) {}
-pub(crate) fn extend(_: &Model, _: &State, _: &mut Scratch) -> bool { false }
-pub(crate) fn limit(_: &Model, _: &State, _: &Scratch, s: f64) -> f64 { s }
+use crate::state::{State, ThreadContact};
+use glam::{DMat3, DVec3};
+
+/// Two places of thread that may not come nearer than `sum` along `normal`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ThreadRow {
+    a: usize,
+    b: usize,
+    s: f64,
+    t: f64,
+    /// Normal from b toward a and two tangents.
+    axes: [DVec3; 3],
+    /// Distance kept between the centerlines \[m\] and the two radii.
+    sum: f64,
+    radii: [f64; 2],
+    /// Compliance of the contact itself \[m/N\].
+    compliance: f64,
+    mu: [f64; 2],
+    sliding: bool,
+    /// Friction force on a at the start of the substep, and slip that was still to be undone.
+    anchor: DVec3,
+    drift: DVec3,
+    /// Force on a along the axes \[N\].
+    force: DVec3,
+    /// Clearance already missing at the start: it is won back over a few substeps, not at once.
+    start_gap: f64,
+}
+
+/// One side of a row: its element, its sign and its Jacobian as right-side columns on blocks `element` and `element + 1`.
+#[derive(Debug, Clone, Copy)]
+struct Endpoint {
+    element: usize,
+    row: u32,
+    /// Columns on (x, theta) of block `element`, and on x of the next.
+    here: Columns,
+    next: DMat3,
+}
+
+/// Memory of the coupling.
+#[derive(Default)]
+pub(crate) struct Coupling {
+    active: Vec<u32>,
+    endpoints: Vec<Endpoint>,
+    /// Zone blocks that endpoints touch, ascending, and the transfer from each to the one before it.
+    blocks: Vec<usize>,
+    jumps: Vec<Block>,
+    s: Vec<f64>,
+    b: Vec<f64>,
+    mu: Vec<f64>,
+    force: Vec<f64>,
+    cone: Cone,
+    right: Vec<DVec3>,
+    fresh: Vec<ThreadRow>,
+}
+
+impl ThreadRow {
+    fn new(model: &Model, start: &[DVec3], a: usize, b: usize, s: f64, t: f64, normal: DVec3) -> Self {
+        let (ra, rb) = (model.rods.at(model.rod_of[a]).expect("living"), model.rods.at(model.rod_of[b]).expect("living"));
+        let f = model.friction_between(ra.surface, rb.surface);
+        // Tangents along and across the mean direction of a: any pair will do, this one turns with the thread.
+        let along = start[a + 1] - start[a];
+        let t1 = (along - normal * normal.dot(along)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        ThreadRow {
+            a,
+            b,
+            s,
+            t,
+            axes: [normal, t1, normal.cross(t1)],
+            sum: (ra.radius + rb.radius) * (1.0 + params::KEEP),
+            radii: [ra.radius, rb.radius],
+            compliance: 1.0 / ra.contact_stiffness + 1.0 / rb.contact_stiffness,
+            mu: [f.stick, f.slide],
+            sliding: false,
+            anchor: DVec3::ZERO,
+            drift: DVec3::ZERO,
+            force: DVec3::ZERO,
+            start_gap: 0.0,
+        }
+    }
+
+    fn apart(&self, x: &[DVec3]) -> DVec3 {
+        x[self.a].lerp(x[self.a + 1], self.s) - x[self.b].lerp(x[self.b + 1], self.t)
+    }
+
+    /// Slip of the two surfaces against each other since the start of the substep, linear in the rotations, as a vector.
+    fn slip(&self, state: &State, scratch_start: &[DVec3], start_frame: &[glam::DQuat]) -> DVec3 {
+        let turned = |e: usize| log(state.orientation[e] * start_frame[e].conjugate());
+        let n = self.axes[0];
+        let moved = self.apart(&state.position) - self.apart(scratch_start);
+        let spin = turned(self.a).cross(n * -self.radii[0]) - turned(self.b).cross(n * self.radii[1]);
+        let slip = moved + spin;
+        slip - n * n.dot(slip)
+    }
+
+    fn endpoints(&self, row: u32) -> [Endpoint; 2] {
+        let side = |element: usize, s: f64, sign: f64, arm: DVec3| {
+            let [n, t1, t2] = self.axes;
+            let axes = DMat3::from_cols(n, t1, t2) * sign;
+            // The normal force acts at the centerline, friction at the surface.
+            let turn = DMat3::from_cols(DVec3::ZERO, arm.cross(t1), arm.cross(t2)) * sign;
+            Endpoint { element, row, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
+        };
+        let n = self.axes[0];
+        [side(self.a, self.s, 1.0, n * -self.radii[0]), side(self.b, self.t, -1.0, n * self.radii[1])]
+    }
+
+    fn key(&self) -> (usize, usize) {
+        (self.a, self.b)
+    }
+
+    /// Places along both threads in element units, to find rows that say the same.
+    fn place(&self) -> (f64, f64) {
+        (self.a as f64 + self.s, self.b as f64 + self.t)
+    }
+}
+
+/// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's forces.
+pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
+    let Scratch { candidates, start, rows, .. } = scratch;
+    rows.threads.clear();
+    let old = &state.thread_contacts;
+    for (a, b) in &candidates.threads {
+        let (a, b) = (*a as usize, *b as usize);
+        let c = segment::closest(start[a], start[a + 1], start[b], start[b + 1]);
+        let mut row = ThreadRow::new(model, start, a, b, c.s, c.t, DVec3::Z);
+        let r = 0.5 * (row.radii[0] + row.radii[1]);
+        let motion = relative_motion(start, &state.position, a, b).min(4.0 * r);
+        let room = row.sum + params::MARGIN * r + 1.5 * motion;
+        if c.apart.length_squared() > room * room {
+            continue;
+        }
+        // Near-parallel pieces touch along a stretch: a row at each end of their overlap as well.
+        let (u, v) = (start[a + 1] - start[a], start[b + 1] - start[b]);
+        let cosine = u.dot(v) / (u.length() * v.length());
+        let mut places = [(c.s, c.t); 5];
+        let mut count = 1;
+        if cosine * cosine > params::PARALLEL {
+            for (s, t) in [(Some(0.0), None), (Some(1.0), None), (None, Some(0.0)), (None, Some(1.0))] {
+                let place = match (s, t) {
+                    (Some(s), _) => (s, (start[a].lerp(start[a + 1], s) - start[b]).dot(v) / v.length_squared()),
+                    (_, Some(t)) => ((start[b].lerp(start[b + 1], t) - start[a]).dot(u) / u.length_squared(), t),
+                    _ => continue,
+                };
+                let inside = |x: f64| (0.0..=1.0).contains(&x);
+                if inside(place.0) && inside(place.1) && places[..count].iter().all(|p| (p.0 - place.0).abs() > 0.2) {
+                    places[count] = place;
+                    count += 1;
+                }
+            }
+        }
+        for (s, t) in &places[..count] {
+            let apart = start[a].lerp(start[a + 1], *s) - start[b].lerp(start[b + 1], *t);
+            if apart.length_squared() > room * room {
+                continue;
+            }
+            let known = nearest_known(old, a, b, *s, *t);
+            let mut normal = apart.try_normalize().unwrap_or(DVec3::Z);
+            if let Some(k) = known.filter(|k| (k.a as usize, k.b as usize) == (a, b) && k.normal.dot(normal) < 0.0) {
+                // It was on the other side: it has been pushed through and goes back.
+                normal = if apart.length() < 0.5 * row.sum { -normal } else { normal };
+                if apart.length() == 0.0 {
+                    normal = k.normal;
+                }
+            }
+            row = ThreadRow::new(model, start, a, b, *s, *t, normal);
+            row.start_gap = normal.dot(apart) - row.sum;
+            rows.threads.push(row);
+        }
+    }
+    merge(&mut rows.threads);
+    inherit(old, &mut rows.threads);
+    let _ = h;
+}
+
+/// The last contact on the same pair of elements that is nearest in place.
+fn nearest_known(old: &[ThreadContact], a: usize, b: usize, s: f64, t: f64) -> Option<ThreadContact> {
+    let from = old.partition_point(|c| (c.a as usize, c.b as usize) < (a, b));
+    let far = |c: &ThreadContact| (c.s - s).abs() + (c.t - t).abs();
+    old[from..].iter().take_while(|c| (c.a as usize, c.b as usize) == (a, b)).min_by(|x, y| far(x).total_cmp(&far(y))).copied()
+}
+
+/// Leaves one of rows at the same two places (neighboring elements share a particle). Only those: a row between neighbors guards
+/// what its neighbor does not.
+fn merge(rows: &mut Vec<ThreadRow>) {
+    rows.sort_by(|x, y| x.place().partial_cmp(&y.place()).expect("places are finite"));
+    rows.dedup_by(|x, y| {
+        let (p, q) = (x.place(), y.place());
+        (p.0 - q.0).abs() < 1e-6 && (p.1 - q.1).abs() < 1e-6
+    });
+}
+
+/// Gives each old contact's force and anchor to the row that is nearest to it along both threads, within an element and a half.
+fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
+    for c in old {
+        let (pa, pb) = (f64::from(c.a) + c.s, f64::from(c.b) + c.t);
+        let from = rows.partition_point(|r| r.place().0 < pa - 1.5);
+        let far = |r: &ThreadRow| {
+            let p = r.place();
+            (p.0 - pa).abs() + (p.1 - pb).abs()
+        };
+        let near = rows[from..]
+            .iter_mut()
+            .take_while(|r| r.place().0 <= pa + 1.5)
+            .filter(|r| (r.place().1 - pb).abs() <= 1.5 && r.axes[0].dot(c.normal) > 0.0)
+            .min_by(|x, y| far(x).total_cmp(&far(y)));
+        if let Some(row) = near {
+            let n = row.axes[0];
+            let friction = c.friction - n * n.dot(c.friction);
+            row.force += DVec3::new(c.normal_force, row.axes[1].dot(friction), row.axes[2].dot(friction));
+            row.anchor += friction;
+            row.drift = c.drift - n * n.dot(c.drift);
+            row.sliding |= c.sliding;
+        }
+    }
+}
+
+/// Sets the zone of each rod: from the first to the last block that a row touches.
+pub(crate) fn zones(scratch: &mut Scratch) {
+    let Scratch { rods, rows, .. } = scratch;
+    for (blocks, zone) in rods.iter_mut() {
+        let (mut lo, mut hi) = (usize::MAX, 0);
+        for e in rows.threads.iter().flat_map(|r| [r.a, r.b]).filter(|e| blocks.contains(e)) {
+            lo = lo.min(e);
+            hi = hi.max(e + 1);
+        }
+        *zone = if lo == usize::MAX { blocks.end - 1..blocks.end } else { lo..hi + 1 };
+    }
+}
+
+/// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
+pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
+    let Scratch { rods, rows, system, step, start, start_frame, .. } = scratch;
+    if rows.threads.is_empty() {
+        return;
+    }
+    let Coupling { active, endpoints, blocks, jumps, s, b, mu, force, cone, right, .. } = &mut rows.solver;
+    active.clear();
+    b.clear();
+    mu.clear();
+    force.clear();
+    let mut smallest = f64::INFINITY;
+    for (k, row) in rows.threads.iter_mut().enumerate() {
+        // Where the step without contact forces would leave the row.
+        let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
+        let moved = d(row.a, row.s) - d(row.b, row.t);
+        let n = row.axes[0];
+        let gap = n.dot(row.apart(&state.position)) - row.sum + n.dot(moved);
+        let r = row.radii[0].min(row.radii[1]);
+        if row.force.x <= 0.0 && gap > params::PRUNE * r {
+            row.force = DVec3::ZERO;
+            continue;
+        }
+        smallest = smallest.min(r);
+        let spin = step[2 * row.a + 1].cross(n * -row.radii[0]) - step[2 * row.b + 1].cross(n * row.radii[1]);
+        let slip = row.slip(state, start, start_frame) + moved + spin + row.drift - row.anchor * row.compliance;
+        active.push(k as u32);
+        // An overlap from before is pushed out over a few substeps.
+        let allowed = if row.start_gap < 0.0 { row.start_gap * params::RECOVER } else { 0.0 };
+        b.extend([gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])]);
+        mu.push(row.mu[usize::from(row.sliding)]);
+        force.extend(row.force.to_array());
+    }
+    let n = b.len();
+    if n == 0 {
+        return;
+    }
+    s.clear();
+    s.resize(n * n, 0.0);
+    for (_, zone) in rods.iter() {
+        endpoints.clear();
+        for (k, index) in active.iter().enumerate() {
+            endpoints.extend(rows.threads[*index as usize].endpoints(k as u32).into_iter().filter(|p| zone.contains(&p.element) && p.element + 1 < zone.end));
+        }
+        if endpoints.is_empty() {
+            continue;
+        }
+        endpoints.sort_by_key(|p| (p.element, p.row));
+        system.invert_zone(zone);
+        blocks.clear();
+        for p in endpoints.iter() {
+            for k in [p.element, p.element + 1] {
+                if blocks.last().is_none_or(|l| *l < k) {
+                    blocks.push(k);
+                }
+            }
+        }
+        // Transfer from each touched block up to the one before it.
+        jumps.clear();
+        jumps.push(Block::default());
+        for pair in blocks.windows(2) {
+            let mut jump = system.transfer(pair[1] - 1).negated();
+            for k in (pair[0]..pair[1] - 1).rev() {
+                jump = system.transfer(k).negated().mul(&jump);
+            }
+            jumps.push(jump);
+        }
+        compliance_between(system, endpoints, blocks, jumps, s, n);
+    }
+    for k in 0..active.len() {
+        let c = rows.threads[active[k] as usize].compliance;
+        for i in 3 * k..3 * k + 3 {
+            s[i * n + i] += c;
+            for j in 0..i {
+                s[i * n + j] = s[j * n + i];
+            }
+        }
+    }
+    let limits = Limits {
+        inner: params::CONTACT_TOLERANCE * smallest,
+        outer: 2.0 * params::CONTACT_TOLERANCE * smallest,
+        max_inner: 20,
+        max_outer: 6,
+        proximal: params::PROXIMAL,
+    };
+    cone.solve(s, b, mu, force, &limits);
+    right.clear();
+    right.resize(step.len(), DVec3::ZERO);
+    for (k, index) in active.iter().enumerate() {
+        let row = &mut rows.threads[*index as usize];
+        row.force = DVec3::new(force[3 * k], force[3 * k + 1], force[3 * k + 2]);
+        for p in row.endpoints(0) {
+            right[2 * p.element] += p.here.x * row.force;
+            right[2 * p.element + 1] += p.here.t * row.force;
+            right[2 * p.element + 2] += p.next * row.force;
+        }
+    }
+    for (node, r) in right.iter_mut().enumerate() {
+        if scratch.freedom[node] != crate::scratch::Freedom::Free {
+            *r = scratch.freedom[node].projector() * *r;
+        }
+    }
+    for (rod, zone) in rods.iter() {
+        system.solve(rod.clone(), zone, right);
+    }
+    for (z, r) in step.iter_mut().zip(right.iter()) {
+        *z += *r;
+    }
+}
+
+/// Adds `G W G^T` over the endpoints of one rod to the upper triangle of `s`.
+fn compliance_between(system: &crate::rod::factor::System, endpoints: &[Endpoint], blocks: &[usize], jumps: &[Block], s: &mut [f64], n: usize) {
+    for (qi, q) in endpoints.iter().enumerate() {
+        // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
+        let e = q.element;
+        let (x_here, x_next, k) = (system.inverse(e), system.inverse(e + 1), system.transfer(e));
+        let kt = k.transpose().mul_columns(&q.here);
+        let pushed = Columns { x: q.next - kt.x, t: -kt.t };
+        let mut next = x_next.mul_columns(&pushed);
+        let direct = x_next.mul_columns(&Columns { x: q.next, t: DMat3::ZERO });
+        let up = k.mul_columns(&direct);
+        let own = x_here.mul_columns(&q.here);
+        let mut here = Columns { x: own.x - up.x, t: own.t - up.t };
+        let mut at = blocks.partition_point(|b| *b < e);
+        let mut pi = qi + 1;
+        // Endpoints on the same element after q are handled when they are q.
+        while pi > 0 {
+            pi -= 1;
+            let p = &endpoints[pi];
+            while blocks[at] > p.element {
+                at -= 1;
+                next = here;
+                here = jumps[at + 1].mul_columns(&here);
+            }
+            let value = p.here.x.transpose() * here.x + p.here.t.transpose() * here.t + p.next.transpose() * next.x;
+            let (r, c) = (3 * p.row as usize, 3 * q.row as usize);
+            for j in 0..3 {
+                for i in 0..3 {
+                    let v = value.col(j)[i];
+                    if r < c {
+                        s[(r + i) * n + c + j] += v;
+                    } else if r > c {
+                        s[(c + j) * n + r + i] += v;
+                    } else {
+                        // Both sides of one row on one rod: count the pair and its mirror image.
+                        let twice = pi != qi;
+                        s[(r + i) * n + c + j] += v;
+                        if twice {
+                            s[(r + j) * n + c + i] += v;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Adds the rows' forces to `scratch.rhs`.
+pub(crate) fn add_forces(scratch: &mut Scratch) {
+    let Scratch { rows, rhs, .. } = scratch;
+    for row in &rows.threads {
+        for p in row.endpoints(0) {
+            rhs[2 * p.element] += p.here.x * row.force;
+            rhs[2 * p.element + 1] += p.here.t * row.force;
+            rhs[2 * p.element + 2] += p.next * row.force;
+        }
+    }
+}
+
+/// Factor on the update so that no pair of centerlines comes nearer in one iteration than most of the way to the least distance allowed.
+pub(crate) fn limit(_model: &Model, state: &State, scratch: &Scratch, scale: f64) -> f64 {
+    let x = &state.position;
+    let step = &scratch.step;
+    let mut scale = scale;
+    for (a, b) in &scratch.candidates.threads {
+        let (a, b) = (*a as usize, *b as usize);
+        let d = |i: usize| step[2 * i];
+        let m = |i: usize, j: usize| (d(i) - d(j)).length_squared();
+        let moved = m(a, b).max(m(a, b + 1)).max(m(a + 1, b)).max(m(a + 1, b + 1)).sqrt() * scale;
+        let (ra, rb) = (scratch.radius[a], scratch.radius[b]);
+        let sum = ra + rb;
+        if moved < 0.2 * sum {
+            continue;
+        }
+        let c = segment::closest(x[a], x[a + 1], x[b], x[b + 1]).apart.length();
+        let free = (c - 0.5 * sum).max(0.2 * sum);
+        if moved > free {
+            scale *= free / moved;
+        }
+    }
+    scale
+}
+
+/// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was added.
+pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
+    let Scratch { candidates, start, rows, .. } = scratch;
+    let x = &state.position;
+    let fresh = &mut rows.solver.fresh;
+    fresh.clear();
+    for (a, b) in &candidates.threads {
+        let (a, b) = (*a as usize, *b as usize);
+        let sum = scratch.radius[a] + scratch.radius[b];
+        let least = sum * (1.0 + params::KEEP - params::SLACK);
+        let middle = 0.5 * (x[a] + x[a + 1] - x[b] - x[b + 1]).length() - 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
+        if middle > least {
+            continue;
+        }
+        let now = segment::closest(x[a], x[a + 1], x[b], x[b + 1]);
+        let d = now.apart.length();
+        if d >= least {
+            continue;
+        }
+        let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]);
+        let d0 = before.apart.length();
+        if d > d0 - 1e-3 * sum && d0 < sum * (1.0 + params::KEEP) {
+            continue;
+        }
+        // The side that it came from.
+        let normal = now.apart.try_normalize().or_else(|| before.apart.try_normalize()).unwrap_or(DVec3::Z);
+        let normal = if normal.dot(before.apart) < 0.0 { -normal } else { normal };
+        let mut row = ThreadRow::new(model, start, a, b, now.s, now.t, normal);
+        row.start_gap = (normal.dot(row.apart(start)) - row.sum).min(d0 - row.sum);
+        fresh.push(row);
+    }
+    merge(fresh);
+    let known = rows.threads.len();
+    for row in fresh.iter() {
+        let same = rows.threads[..known].iter().any(|r| {
+            r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999
+        });
+        if !same {
+            rows.threads.push(*row);
+        }
+    }
+    rows.threads.len() > known
+}
+
+/// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left undone.
+pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
+    let mut contacts = core::mem::take(&mut state.thread_contacts);
+    contacts.clear();
+    for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {
+        let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
+        let limit = row.mu[usize::from(row.sliding)] * row.force.x;
+        let sliding = friction.length() >= 0.9999 * limit;
+        let drift = if sliding {
+            DVec3::ZERO
+        } else {
+            let slip = row.slip(state, &scratch.start, &scratch.start_frame);
+            (row.drift + slip + (friction - row.anchor) * row.compliance).clamp_length_max(0.1 * row.radii[0])
+        };
+        contacts.push(ThreadContact {
+            a: row.a as u32,
+            b: row.b as u32,
+            s: row.s,
+            t: row.t,
+            normal: row.axes[0],
+            normal_force: row.force.x,
+            friction,
+            drift,
+            sliding,
+        });
+    }
+    contacts.sort_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
+    state.thread_contacts = contacts;
+}

@@ -83,6 +83,8 @@ pub(crate) struct ThreadContact {
     /// Normal force \[N\] and friction force on a \[N\].
     pub normal_force: f64,
     pub friction: DVec3,
+    /// Slip that the friction spring has still to undo \[m\].
+    pub drift: DVec3,
     /// Whether it slid.
     pub sliding: bool,
 }

@@ -1,0 +1,129 @@
+//! A binary tree of boxes over the elements in array order. Neighbors along a thread are neighbors in space, so the tree never needs
+//! sorting: it is refilled bottom up.
+
+use glam::DVec3;
+
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounds {
+    pub lo: DVec3,
+    pub hi: DVec3,
+}
+
+impl Bounds {
+    pub const EMPTY: Bounds = Bounds { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY };
+
+    pub fn of(points: &[DVec3], grow: f64) -> Self {
+        let mut b = Bounds::EMPTY;
+        for p in points {
+            b.lo = b.lo.min(*p);
+            b.hi = b.hi.max(*p);
+        }
+        Bounds { lo: b.lo - DVec3::splat(grow), hi: b.hi + DVec3::splat(grow) }
+    }
+    #[inline(always)]
+    fn union(&self, o: &Bounds) -> Bounds {
+        Bounds { lo: self.lo.min(o.lo), hi: self.hi.max(o.hi) }
+    }
+    #[inline(always)]
+    pub fn overlaps(&self, o: &Bounds) -> bool {
+        self.lo.cmple(o.hi).all() && o.lo.cmple(self.hi).all()
+    }
+}
+
+#[derive(Default)]
+pub(crate) struct Tree {
+    /// Heap order: children of `k` are `2 k + 1` and `2 k + 2`; the last `leaves` entries are the leaves.
+    nodes: Vec<Bounds>,
+    leaves: usize,
+    stack: Vec<(u32, u32)>,
+}
+
+impl Tree {
+    /// Refills the tree with `n` leaves.
+    pub fn fill(&mut self, n: usize, leaf: impl Fn(usize) -> Bounds) {
+        self.leaves = n.next_power_of_two();
+        self.nodes.clear();
+        self.nodes.resize(2 * self.leaves - 1, Bounds::EMPTY);
+        for i in 0..n {
+            self.nodes[self.leaves - 1 + i] = leaf(i);
+        }
+        for k in (0..self.leaves - 1).rev() {
+            self.nodes[k] = self.nodes[2 * k + 1].union(&self.nodes[2 * k + 2]);
+        }
+    }
+
+    pub fn leaf(&self, i: usize) -> &Bounds {
+        &self.nodes[self.leaves - 1 + i]
+    }
+
+    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves.
+    pub fn pairs(&mut self, mut found: impl FnMut(usize, usize)) {
+        let inner = self.leaves as u32 - 1;
+        self.stack.clear();
+        self.stack.push((0, 0));
+        while let Some((a, b)) = self.stack.pop() {
+            if a == b {
+                if a < inner {
+                    self.stack.extend([(2 * a + 1, 2 * a + 1), (2 * a + 2, 2 * a + 2), (2 * a + 1, 2 * a + 2)]);
+                }
+                continue;
+            }
+            if !self.nodes[a as usize].overlaps(&self.nodes[b as usize]) {
+                continue;
+            }
+            // Two different nodes are always of the same level.
+            if a >= inner {
+                found((a - inner) as usize, (b - inner) as usize);
+            } else {
+                let (a, b) = (2 * a + 1, 2 * b + 1);
+                self.stack.extend([(a, b), (a, b + 1), (a + 1, b), (a + 1, b + 1)]);
+            }
+        }
+    }
+
+    /// Calls `found(i)` for all leaves that overlap `with`.
+    pub fn overlapping(&mut self, with: &Bounds, mut found: impl FnMut(usize)) {
+        let inner = self.leaves as u32 - 1;
+        self.stack.clear();
+        self.stack.push((0, 0));
+        while let Some((a, _)) = self.stack.pop() {
+            if !self.nodes[a as usize].overlaps(with) {
+                continue;
+            }
+            if a >= inner {
+                found((a - inner) as usize);
+            } else {
+                self.stack.extend([(2 * a + 1, 0), (2 * a + 2, 0)]);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn finds_the_pairs_that_brute_force_finds() {
+        let at = |i: usize| {
+            let s = i as f64 * 0.37;
+            DVec3::new((3.1 * s).sin(), (2.3 * s).cos(), (1.7 * s).sin())
+        };
+        let boxes: Vec<Bounds> = (0..37).map(|i| Bounds::of(&[at(i), at(i + 1)], 0.1)).collect();
+        let mut tree = Tree::default();
+        tree.fill(boxes.len(), |i| boxes[i]);
+        let mut got = Vec::new();
+        tree.pairs(|i, j| got.push((i, j)));
+        got.sort_unstable();
+        let mut want = Vec::new();
+        for i in 0..boxes.len() {
+            for j in i + 1..boxes.len() {
+                if boxes[i].overlaps(&boxes[j]) {
+                    want.push((i, j));
+                }
+            }
+        }
+        assert_eq!(got, want);
+        assert!(want.len() > 40 && want.len() < 600);
+    }
+}

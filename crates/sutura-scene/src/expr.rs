@@ -14,7 +14,6 @@ pub enum Named {
     Thread(usize),
     Shape(usize),
     Grip(usize),
-    Load(usize),
     Probe(usize),
 }
 

@@ -130,13 +130,13 @@ impl<'d> Loader<'d> {
             table.finish();
         }
 
+        // Before the phases, whose conditions may name them; an expression may use the probes before its own.
+        let probes = self.probes(root);
         let phase_tables = root.tables("phase");
         if phase_tables.is_empty() {
             root.problem("there is no `[[phase]]`: nothing would happen", Some("for instance [[phase]] with name = \"run\" and duration = \"1 s\"".into()));
         }
         let phases: Vec<Phase> = phase_tables.iter().enumerate().filter_map(|(i, t)| self.phase(t, i)).collect();
-        // Probes are named before conditions are read, but an expression may use only those read so far.
-        let probes = self.probes(root);
         let profiles = root.tables("profile").iter().filter_map(|t| self.profile(t)).collect();
         let checks = root.tables("check").iter().enumerate().filter_map(|(i, t)| self.check(t, i)).collect();
 
@@ -246,7 +246,8 @@ impl<'d> Loader<'d> {
         }
     }
     fn add_load(&mut self, name: &str) {
-        if self.names.add(name, Named::Load(self.loads.len())) {
+        // Loads have names of their own: no expression asks for one.
+        if !self.loads.iter().any(|l| l == name) {
             self.loads.push(name.into());
         }
     }
@@ -266,7 +267,12 @@ impl<'d> Loader<'d> {
         self.find(value, "grip", |n| if let Named::Grip(i) = n { Some(i) } else { None })
     }
     fn find_load(&self, value: &Value<'d>) -> Option<usize> {
-        self.find(value, "load", |n| if let Named::Load(i) = n { Some(i) } else { None })
+        let name = value.text()?;
+        let found = self.loads.iter().position(|l| *l == name);
+        if found.is_none() {
+            value.problem(format!("no load is called `{name}`"), suggest(&name, self.loads.iter().map(String::as_str)));
+        }
+        found
     }
     fn find_mover(&self, value: &Value<'d>) -> Option<Mover> {
         self.find(value, "grip or shape", |n| match n {

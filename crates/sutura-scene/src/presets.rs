@@ -126,8 +126,8 @@ const fn size(name: &'static str, metric: f64, range_mm: (f64, f64), middle_mm: 
     Size {
         name,
         metric,
-        diameter_range: (range_mm.0 * 1e-3, range_mm.1 * 1e-3),
-        diameter: Figure { value: middle_mm * 1e-3, unit: "m", source: RANGES, verified: false },
+        diameter_range: (range_mm.0 / 1e3, range_mm.1 / 1e3),
+        diameter: Figure { value: middle_mm / 1e3, unit: "m", source: RANGES, verified: false },
         knot_pull_absorbable: pull(absorbable),
         knot_pull_nonabsorbable: pull(nonabsorbable),
     }
@@ -224,7 +224,7 @@ mod tests {
     fn presets_are_found_or_the_nearest_is_named() {
         assert_eq!(find_size("3-0").unwrap().diameter.value, 0.225e-3);
         assert_eq!(find_material("Silk").unwrap().young_modulus.value, 8.7e9);
-        assert_eq!(find_size("30").unwrap_err().nearest, Some("3-0"));
+        assert_eq!(find_size("3-00").unwrap_err().nearest, Some("3-0"));
         assert!(find_material("nilon").unwrap_err().to_string().contains("`nylon`"));
         assert_eq!(find_material("granite").unwrap_err().nearest, None);
     }

@@ -144,7 +144,7 @@ const CLOSURES: usize = 24;
 /// Agreement below which there is no answer.
 const AGREEMENT: f64 = 0.9;
 /// Crossings of a summand beyond which its invariants may overflow, and would take long.
-const MOST_CROSSINGS: usize = 48;
+const MOST_CROSSINGS: usize = 32;
 
 /// Recognizes a polyline. `seed` chooses the views and the closures; the same seed gives the same answer. Takes a few milliseconds
 /// for a thousand points. The units of `points` do not matter. Input that cannot be recognized gives [`KnotType::Unknown`] and a
@@ -172,11 +172,11 @@ pub fn recognize(points: &[DVec3], ends: Ends, seed: u64) -> Recognition {
     }
 }
 
-/// Neighbors at one place are made one point, and everything is brought to a ball of radius about one. The scale is a power of
+/// Neighbors at one place are made one point, and everything is brought to a cube of side two to four. The scale is a power of
 /// two, which keeps the digits. `None` when nothing is left.
 fn prepared(points: &[DVec3], closed: bool) -> Option<Vec<DVec3>> {
     let b = space::Aabb::around(points);
-    let (middle, size) = (0.5 * b.min + 0.5 * b.max, (0.5 * b.max - 0.5 * b.min).length());
+    let (middle, size) = (0.5 * b.min + 0.5 * b.max, (0.5 * b.max - 0.5 * b.min).max_element());
     if !(middle.is_finite() && size.is_finite() && size > 0.0) {
         return None;
     }
@@ -282,9 +282,7 @@ fn recognize_closures(closures: &[Vec<DVec3>], rng: &mut Rng) -> Recognition {
 
 /// A closed polygon, from several directions. All views must have the same invariants; the name is taken from the simplest.
 fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
-    // How often a polygon that resists is shaken and looked at again for a simpler view.
-    const SHAKES: u32 = 60;
-    const MOST_SHAKEN: usize = 200;
+    const MORE_VIEWS: u32 = 20;
     reduce::reduce(&mut polygon, true, &[]);
     if polygon.len() < 6 {
         // No knot has fewer than six sticks.
@@ -299,27 +297,14 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
         }
     }
     let has_name = |v: &(Invariants, Vec<Part>)| v.1.iter().all(|p| p.prime.is_some());
-    let mut shakes = 0;
-    while !views.iter().any(has_name) && shakes < SHAKES && polygon.len() < MOST_SHAKEN {
-        shakes += 1;
-        reduce::shake(&mut polygon, rng);
-        let mut thinned = polygon.clone();
-        reduce::reduce(&mut thinned, true, &[]);
-        if thinned.len() < polygon.len() || shakes % 4 == 0 {
-            polygon = thinned;
+    // What could have a name is worth looking at from more sides for a simpler view, which replaces one with the same invariants.
+    for _ in 0..MORE_VIEWS {
+        if views.iter().any(|v| v.1.iter().all(|p| p.prime.is_some())) || !views.iter().any(|v| could_have_name(&v.0)) {
+            break;
         }
-        let Some(summands) = view(&polygon, rng) else { continue };
-        let n: usize = summands.iter().map(Diagram::n_crossings).sum();
-        let fewest = views.iter().map(|v| crossings(&v.1)).min();
-        if fewest.is_some_and(|f| n >= f) {
-            continue;
-        }
-        let Ok(better) = identify(&summands) else { continue };
-        // It replaces a worse view with the same invariants, so that the number of views stays.
-        match views.iter().position(|v| v.0 == better.0) {
-            Some(k) => views[k] = better,
-            None if (views.len() as u32) < PROJECTIONS => views.push(better),
-            None => {}
+        let Some(Ok(better)) = view(&polygon, rng).map(|v| identify(&v)) else { continue };
+        if let Some(k) = views.iter().position(|v| v.0 == better.0 && crossings(&v.1) > crossings(&better.1)) {
+            views[k] = better;
         }
     }
     let agreed = |v: &Invariants| views.iter().filter(|w| w.0 == *v).count();
@@ -366,24 +351,23 @@ fn view(polygon: &[DVec3], rng: &mut Rng) -> Option<Vec<Diagram>> {
     const DIRECTIONS: usize = 4;
     const ATTEMPTS: usize = 16;
     let mut turned = Vec::new();
-    let mut simplest: Option<(usize, Vec<Diagram>)> = None;
+    let mut simplest: Option<Diagram> = None;
     let mut seen = 0;
     for _ in 0..ATTEMPTS {
         let turn = rng.rotation();
         turned.clear();
         turned.extend(polygon.iter().map(|p| turn * *p));
-        let Some(diagram) = Diagram::project(&turned) else { continue };
-        let summands = diagram.summands();
-        let n = summands.iter().map(Diagram::n_crossings).sum();
-        if simplest.as_ref().is_none_or(|s| n < s.0) {
-            simplest = Some((n, summands));
+        let Some(mut diagram) = Diagram::project(&turned) else { continue };
+        diagram.simplify();
+        if simplest.as_ref().is_none_or(|s| diagram.n_crossings() < s.n_crossings()) {
+            simplest = Some(diagram);
         }
         seen += 1;
         if seen == DIRECTIONS {
             break;
         }
     }
-    simplest.map(|s| s.1)
+    simplest.map(Diagram::summands)
 }
 
 /// What the summands are, and the invariants of their sum.
@@ -417,6 +401,37 @@ fn primes_of(v: &Invariants, n: usize) -> Option<Vec<Prime>> {
         (_, s) if n <= 9 => [3_u8, 5, 7, 9].into_iter().find(|k| alternating((*k).into()) && s == u32::from(k - 1)).map(|k| vec![Prime::Torus(k, turn)]),
         _ => None,
     }
+}
+
+/// Whether some sum of the primes below has this polynomial and signature.
+fn could_have_name(v: &Invariants) -> bool {
+    could_be_sum(&v.alexander, i64::from(v.signature), 9)
+}
+
+/// The same with torus knots of at most `most` crossings, tried in falling order so that each sum is tried once.
+fn could_be_sum(alexander: &[i64], signature: i64, most: u8) -> bool {
+    if alexander == [1] {
+        return signature == 0;
+    }
+    let figure_eight = || quotient(alexander, &[1, -3, 1]).is_some_and(|rest| could_be_sum(&rest, signature, 0));
+    let torus = |n: u8| {
+        let polynomial: Vec<i64> = (0..n).map(|i| if i % 2 == 0 { 1 } else { -1 }).collect();
+        quotient(alexander, &polynomial).is_some_and(|rest| [-1, 1].into_iter().any(|hand| could_be_sum(&rest, signature + hand * i64::from(n - 1), n)))
+    };
+    [9, 7, 5, 3].into_iter().any(|n| n <= most && torus(n)) || figure_eight()
+}
+
+/// Of two polynomials of which the second begins and ends with 1, when it goes without remainder.
+fn quotient(a: &[i64], b: &[i64]) -> Option<Vec<i64>> {
+    let n = (a.len() + 1).checked_sub(b.len())?;
+    let (mut rest, mut result) = (a.to_vec(), vec![0; n]);
+    for k in (0..n).rev() {
+        result[k] = rest[k + b.len() - 1];
+        for (r, c) in rest[k..].iter_mut().zip(b) {
+            *r = r.checked_sub(result[k].checked_mul(*c)?)?;
+        }
+    }
+    rest.iter().all(|r| *r == 0).then_some(result)
 }
 
 impl Prime {

@@ -151,12 +151,15 @@ impl Diagram {
         }
     }
 
-    /// Cuts the diagram into connected summands where a stretch of the strand closes on itself: each of its crossings has both
-    /// passages in it. Every part is simplified; parts without crossings are dropped.
+    /// Simplifies as far as it goes without ever adding crossings, and cuts the diagram into connected summands where a stretch of the strand closes on itself: each of its crossings has both passages in it. Parts
+    /// without crossings are dropped.
     pub fn summands(mut self) -> Vec<Diagram> {
         let mut done = Vec::new();
         loop {
             self.simplify();
+            while !self.code.is_empty() && self.lay_strand_shorter() {
+                self.simplify();
+            }
             let Some((start, len)) = self.shortest_summand() else { break };
             self.code.rotate_left(start);
             let rest = self.code.split_off(len);
@@ -225,19 +228,13 @@ impl Diagram {
         (at_minus_one == determinant && at_one == 1).then_some(Invariants { determinant, signature, alexander })
     }
 
-    fn goeritz(&self, crossings: &[(i8, usize, usize)]) -> Option<(u64, i32)> {
+    /// The regions of the plane. Edge k leaves passage k; it has a left side 2 k and a right side 2 k + 1, and sides that meet at a
+    /// corner are one region. Also a side at each corner of each crossing; corner k lies between its strands k and k + 1, counted
+    /// counterclockwise from the incoming lower one.
+    fn regions(&self, crossings: &[(i8, usize, usize)]) -> (Regions, Vec<[usize; 4]>) {
         let n_edges = self.code.len();
-        // Edge k leaves passage k. Each edge has a left side 2 k and a right side 2 k + 1; sides that meet at a corner are one region.
-        let mut region: Vec<usize> = (0..2 * n_edges).collect();
-        fn find(region: &mut [usize], mut k: usize) -> usize {
-            while region[k] != k {
-                region[k] = region[region[k]];
-                k = region[k];
-            }
-            k
-        }
+        let mut region = Regions((0..2 * n_edges).collect());
         let into = |place: usize| (place + n_edges - 1) % n_edges;
-        // Corner k of a crossing lies between its strands k and k + 1, counted counterclockwise from the incoming lower one.
         let mut corners = Vec::with_capacity(crossings.len());
         for &(sign, under, over) in crossings {
             // (edge, whether it leaves the crossing)
@@ -249,13 +246,78 @@ impl Diagram {
                 let ((e, leaves), (f, next_leaves)) = (strands[k], strands[(k + 1) % 4]);
                 let counterclockwise_of = 2 * e + usize::from(!leaves);
                 let clockwise_of = 2 * f + usize::from(next_leaves);
-                let (x, y) = (find(&mut region, counterclockwise_of), find(&mut region, clockwise_of));
-                region[x] = y;
+                region.unite(counterclockwise_of, clockwise_of);
                 corner[k] = counterclockwise_of;
             }
             corners.push(corner);
         }
-        let roots: Vec<usize> = (0..2 * n_edges).map(|k| find(&mut region, k)).collect();
+        (region, corners)
+    }
+
+    /// Lays a strand that goes over (or under) everything it meets somewhere else, where it meets less: between its ends any way over
+    /// all else is as good. Whether there was such a strand.
+    fn lay_strand_shorter(&mut self) -> bool {
+        let n = self.code.len();
+        let (base, _) = self.regions(&self.crossings());
+        for start in 0..n {
+            let over = self.code[start].over;
+            let before = (start + n - 1) % n;
+            if self.code[before].over == over {
+                continue;
+            }
+            let len = (1..n).find(|l| self.code[(start + l) % n].over != over).unwrap_or(n);
+            // Without the strand the regions on its two sides are one.
+            let mut region = Regions(base.0.clone());
+            let mut on_strand = vec![false; n];
+            for k in 0..=len {
+                let edge = (before + k) % n;
+                on_strand[edge] = true;
+                region.unite(2 * edge, 2 * edge + 1);
+            }
+            let (from, to) = (region.find(2 * before), region.find(2 * ((before + len) % n)));
+            if let Some(path) = region.shortest_path(&on_strand, from, to, len - 1) {
+                self.replace_strand(start, len, &path);
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Takes out the strand of `len` passages from `start` on and leads it across the edges of `path`; true is from their left side.
+    fn replace_strand(&mut self, start: usize, len: usize, path: &[(usize, bool)]) {
+        let (n, partner) = (self.code.len(), self.partners());
+        let over = self.code[start].over;
+        let mut gone = vec![false; n];
+        for k in (0..len).map(|k| (start + k) % n) {
+            gone[k] = true;
+            gone[partner[k]] = true;
+        }
+        let first_new = self.signs.len();
+        // From left to right over the edge is right-handed.
+        self.signs.extend(path.iter().map(|(_, from_left)| if *from_left == over { 1 } else { -1 }));
+        let mut across: Vec<Option<usize>> = vec![None; n];
+        for (k, (edge, _)) in path.iter().enumerate() {
+            across[*edge] = Some(first_new + k);
+        }
+        let mut code = Vec::with_capacity(n);
+        for k in 0..n {
+            if !gone[k] {
+                code.push(self.code[k]);
+            }
+            if let Some(c) = across[k] {
+                code.push(Pass { crossing: c as u32, over: !over });
+            }
+            if (k + 1) % n == start {
+                code.extend((0..path.len()).map(|k| Pass { crossing: (first_new + k) as u32, over }));
+            }
+        }
+        self.code = code;
+    }
+
+    fn goeritz(&self, crossings: &[(i8, usize, usize)]) -> Option<(u64, i32)> {
+        let n_edges = self.code.len();
+        let (mut region, corners) = self.regions(crossings);
+        let roots: Vec<usize> = (0..2 * n_edges).map(|k| region.find(k)).collect();
         let n_regions = roots.iter().enumerate().filter(|(k, r)| *k == **r).count();
         if n_regions != crossings.len() + 2 {
             return None;
@@ -342,6 +404,55 @@ impl Diagram {
             coefficients.iter_mut().for_each(|c| *c = -*c);
         }
         Some(coefficients)
+    }
+}
+
+/// Sides of edges joined to regions (union-find).
+struct Regions(Vec<usize>);
+
+impl Regions {
+    fn find(&mut self, mut k: usize) -> usize {
+        while self.0[k] != k {
+            self.0[k] = self.0[self.0[k]];
+            k = self.0[k];
+        }
+        k
+    }
+    fn unite(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a] = b;
+    }
+    /// Edges to cross on the shortest way from one region to another, at most `longest`, none of those that are `closed`; true
+    /// where it is crossed from its left side.
+    fn shortest_path(&mut self, closed: &[bool], from: usize, to: usize, longest: usize) -> Option<Vec<(usize, bool)>> {
+        // (region before, edge, from left)
+        let mut came: Vec<Option<(usize, usize, bool)>> = vec![None; self.0.len()];
+        let mut front = vec![from];
+        for _ in 0..longest {
+            if came[to].is_some() || from == to {
+                break;
+            }
+            let mut next = Vec::new();
+            for edge in (0..closed.len()).filter(|e| !closed[*e]) {
+                let (left, right) = (self.find(2 * edge), self.find(2 * edge + 1));
+                for (a, b, from_left) in [(left, right, true), (right, left, false)] {
+                    if front.contains(&a) && b != from && came[b].is_none() {
+                        came[b] = Some((a, edge, from_left));
+                        next.push(b);
+                    }
+                }
+            }
+            front = next;
+        }
+        let mut path = Vec::new();
+        let mut at = to;
+        while at != from {
+            let (before, edge, from_left) = came[at]?;
+            path.push((edge, from_left));
+            at = before;
+        }
+        path.reverse();
+        Some(path)
     }
 }
 

@@ -3,7 +3,6 @@
 //! they allow a cut that ends within round-off of another strand, and the next rotation of all points then passes it through. So a cut
 //! keeps a margin, a million times the round-off, and in doubt is not made.
 
-use super::Rng;
 use super::space::{Aabb, BoxTree, segment_triangle, segments};
 use glam::DVec3;
 
@@ -121,33 +120,9 @@ pub(super) fn reduce(points: &mut Vec<DVec3>, closed: bool, obstacles: &[[DVec3;
     *points = kept;
 }
 
-/// Moves the corners of a small closed polygon about at random, each by two triangle moves, which leads it out of a shape from
-/// which no corner can be cut although the knot has a simpler one.
-pub(super) fn shake(points: &mut [DVec3], rng: &mut Rng) {
-    let n = points.len();
-    if n < 4 {
-        return;
-    }
-    for i in 0..n {
-        let (a, b, c) = (points[(i + n - 1) % n], points[i], points[(i + 1) % n]);
-        let reach = 0.5 * ((a - b).length() + (c - b).length());
-        let to = b + (0.5 * (a + c) - b) * rng.unit() + rng.direction() * (reach * rng.unit() * rng.unit());
-        let edge = |k: usize| (points[k], points[(k + 1) % n]);
-        // First the point `to` grows out of the edge ab, then b is cut off between `to` and c.
-        let out = [a, to, b];
-        let cut = [to, b, c];
-        let free = (0..n).all(|k| {
-            let (p, q) = edge(k);
-            (k == (i + n - 1) % n || !near_apart_from_corners(out, p, q)) && (k == i || k == (i + n - 1) % n || !near_apart_from_corners(cut, p, q))
-        }) && !near_from(cut, to, [b, c], a);
-        if free {
-            points[i] = to;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::Rng;
     use super::*;
 
     #[test]

@@ -1,0 +1,227 @@
+//! Running scenes: phases, motions, loads, probes, checks, saved states, recordings.
+
+use sutura_scene::{CheckValue, Outcome, Runner, Scene, Trajectory};
+
+fn run(text: &str) -> Outcome {
+    let scene = Scene::parse(text, "test.toml").unwrap_or_else(|e| panic!("{e}"));
+    let mut runner = Runner::new(scene).unwrap_or_else(|e| panic!("{e}"));
+    let mut last = -1.0;
+    loop {
+        let p = runner.step_frame();
+        assert!(p.fraction >= last && p.fraction <= 1.0, "progress never goes back");
+        last = p.fraction;
+        if p.finished {
+            break;
+        }
+    }
+    assert_eq!(last, 1.0);
+    runner.finish()
+}
+
+/// A short monofilament that hangs from its start.
+const HANGING: &str = r#"
+frame_rate = 100
+[solver]
+gravity = [0, 0, 0]
+linear_damping = 0.99
+[[thread]]
+name = "rod"
+diameter = "0.3 mm"
+young_modulus = "2 GPa"
+density = "1150 kg/m^3"
+elements = 10
+line = { from = [0, 0, 0], to = "[0, 0, -50] mm" }
+[[grip]]
+name = "wall"
+at = "start"
+hold = "clamp"
+"#;
+
+#[test]
+fn phases_end_by_time_condition_motion_and_running_out() {
+    let out = run(&format!(
+        r#"{HANGING}
+[[phase]]
+name = "time"
+duration = "50 ms"
+[[phase]]
+name = "condition"
+until = "time() >= 0.1 s"
+[[phase]]
+name = "motion"
+action = [{{ move = "wall", keys = [{{ by = "[0, 0, 1] mm", duration = "30 ms" }}] }}]
+[[phase]]
+name = "late"
+until = "tension(rod) >= 5 N"
+max_duration = "20 ms"
+out_of_time = "accept"
+[[check]]
+that = "phase_time()"
+after = "condition"
+equals = "50 ms"
+tolerance = "1 us"
+[[check]]
+that = "position(wall).z"
+equals = "1 mm"
+tolerance = "1 nm"
+"#
+    ));
+    let phases: Vec<_> = out.report.phases.iter().map(|p| (p.ended_by.as_str(), (p.end_s * 1e3).round() as i64)).collect();
+    assert_eq!(phases, [("duration", 50), ("condition", 100), ("motions done", 130), ("out of time", 150)]);
+    assert!(out.report.passed, "{:?}", out.report.checks);
+    assert_eq!(out.report.frames, 15);
+    // Frame times are exact multiples; the world's own clock sums substeps.
+    assert!((out.report.simulated_s - 0.15).abs() < 1e-12);
+}
+
+#[test]
+fn running_out_of_time_fails_the_run_unless_accepted() {
+    for (late, passed, phases) in [("fail", false, 2), ("stop", false, 1), ("accept", true, 2)] {
+        let out = run(&format!(
+            "{HANGING}\n[[phase]]\nuntil = \"tension(rod) > 1 N\"\nmax_duration = \"20 ms\"\nout_of_time = \"{late}\"\n[[phase]]\nduration = \"10 ms\"\n"
+        ));
+        assert_eq!((out.report.passed, out.report.phases.len()), (passed, phases), "{late}");
+    }
+}
+
+#[test]
+fn loads_ramp_and_are_carried_by_the_grip() {
+    let out = run(&format!(
+        r#"{HANGING}
+[[phase]]
+name = "load"
+action = [{{ load = "weight", at = "end", force = "[0, 0, -10] mN", ramp = "0.2 s" }}]
+[[phase]]
+name = "settle"
+duration = "0.3 s"
+[[phase]]
+name = "free"
+duration = "0.3 s"
+action = [{{ unload = "weight" }}]
+[[probe]]
+name = "pull"
+what = "force(wall).z"
+unit = "mN"
+[[profile]]
+name = "along"
+what = ["position", "tension"]
+after = "settle"
+[[check]]
+name = "half way up the ramp it is half"
+that = "pull"
+at = "0.1 s"
+equals = "5 mN"
+tolerance = "2 %"
+[[check]]
+name = "carried"
+that = "tension(rod.middle)"
+after = "settle"
+equals = "10 mN"
+tolerance = "0.1 %"
+[[check]]
+name = "gone"
+that = "norm(force(wall))"
+at_most = "1 uN"
+[[check]]
+name = "most"
+that = "pull"
+when = "always"
+take = "max"
+equals = "10 mN"
+tolerance = "1 %"
+"#
+    ));
+    assert!(out.report.passed, "{:#?}", out.report.checks);
+    let probe = out.series.iter().find(|s| s.name == "pull").unwrap();
+    assert_eq!(probe.columns, [("time".into(), "s".into()), ("pull".into(), "mN".to_owned())]);
+    assert_eq!(probe.rows.len(), 81, "the first state and 80 frames");
+    let along = out.series.iter().find(|s| s.name == "along").unwrap();
+    assert_eq!((along.rows.len(), along.columns.len()), (10, 5));
+    assert!(along.column("tension").unwrap().iter().all(|t| (t - 0.01).abs() < 1e-5));
+    assert!(along.to_csv().starts_with("arc [m],x [m],y [m],z [m],tension [N]\n0.00"));
+}
+
+#[test]
+fn a_check_that_fails_says_what_it_found() {
+    let out = run(&format!(
+        "{HANGING}\n[[phase]]\nduration = \"20 ms\"\n[[check]]\nname = \"wrong\"\nthat = \"position(rod.end).z\"\nequals = \"-40 mm\"\ntolerance = \"1 mm\"\n[[check]]\nname = \"never\"\nthat = \"time()\"\nat = \"5 s\"\nat_least = \"1 s\"\n"
+    ));
+    let [wrong, never] = out.report.checks.as_slice() else { panic!() };
+    assert!(!wrong.passed && wrong.unit == "mm" && wrong.wanted == "-40 mm ± 1 mm");
+    assert!(matches!(wrong.value, Some(CheckValue::Number(v)) if (v + 50.0).abs() < 1e-3), "{wrong:?}");
+    assert!(!never.passed && never.value.is_none());
+    assert!(!out.report.passed);
+}
+
+#[test]
+fn the_report_and_the_recording_read_back() {
+    let out = run(&format!("{HANGING}\n[[phase]]\nduration = \"30 ms\"\n"));
+    let json = serde_json::to_string_pretty(&out.report).unwrap();
+    for key in ["scene", "solver", "simulated_s", "cpu_s", "real_time_factor", "ms_per_frame", "max_tension_N", "min_clearance", "passes_through", "state_hash"]
+    {
+        assert!(json.contains(&format!("\"{key}\"")), "{key}");
+    }
+    assert_eq!(serde_json::from_str::<sutura_scene::Report>(&json).unwrap(), out.report);
+    let path = tempfile::tempdir().unwrap().keep().join("test.trajectory");
+    out.trajectory.write_to(&path).unwrap();
+    assert_eq!(Trajectory::read_from(&path).unwrap(), out.trajectory);
+    assert_eq!(out.trajectory.frames.len(), 4, "the first state and three frames");
+    assert_eq!(out.trajectory.frames[0].positions[0].len(), 11);
+    std::fs::remove_dir_all(path.parent().unwrap()).unwrap();
+}
+
+#[test]
+fn two_runs_give_the_same_state() {
+    let text =
+        format!("{HANGING}\n[[phase]]\nduration = \"0.2 s\"\naction = [{{ move = \"wall\", keys = [{{ by = \"[3, 0, 0] mm\", duration = \"0.1 s\" }}] }}]\n");
+    assert_eq!(run(&text).report.state_hash, run(&text).report.state_hash);
+}
+
+#[test]
+fn a_saved_state_goes_on_as_if_it_had_not_stopped() {
+    let folder = tempfile::tempdir().unwrap();
+    // A grip that came and went shifts the handles: these must come out the same.
+    let first = "[[phase]]\nduration = \"50 ms\"\naction = [{ take = \"hand\", at = \"end\", hold = \"pin\" }, { take = \"spare\", at = \"middle\", hold = \"pin\" }]\n[[phase]]\nname = \"moved\"\nduration = \"0.1 s\"\nsave = \"moved.state\"\naction = [{ let_go = \"spare\" }, { move = \"hand\", keys = [{ by = \"[5, 0, 0] mm\", duration = \"80 ms\" }] }]\n";
+    // Letting go sets everything moving; driven motion would differ by the rounding of times.
+    let second = "[[phase]]\nduration = \"0.1 s\"\naction = [{ let_go = \"hand\" }]\n";
+    let whole = run(&format!("{HANGING}\n{first}\n{second}"));
+    assert_eq!(whole.saved[0].name, "moved.state");
+    std::fs::write(folder.path().join("moved.state"), &whole.saved[0].bytes).unwrap();
+    let threads_only = HANGING.split("[[grip]]").next().unwrap();
+    let text = format!("start = \"moved.state\"\n{threads_only}\n{second}\n[[check]]\nthat = \"held(wall) and not held(hand) and not held(spare)\"\n");
+    let path = folder.path().join("second.toml");
+    std::fs::write(&path, text).unwrap();
+    let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
+    let mut runner = Runner::new(scene).unwrap_or_else(|e| panic!("{e}"));
+    while !runner.step_frame().finished {}
+    let part = runner.finish();
+    assert!(part.report.passed, "{:?}", part.report.checks);
+    assert_eq!(part.report.state_hash, whole.report.state_hash);
+}
+
+#[test]
+fn shapes_are_moved_and_probed() {
+    let out = run(&format!(
+        r#"{HANGING}
+[[shape]]
+name = "ball"
+kind = "sphere"
+radius = "5 mm"
+position = "[30, 0, 0] mm"
+[[phase]]
+action = [{{ move = "ball", path = "spline", keys = [{{ to = "[40, 0, 0] mm", time = "50 ms" }}, {{ to = "[40, 20, 0] mm", time = "0.1 s" }}] }}]
+[[check]]
+that = "norm(position(ball) - [40, 20, 0] mm)"
+at_most = "1 nm"
+[[check]]
+that = "done(ball)"
+[[check]]
+name = "from its surface to the thread's"
+that = "gap(rod, ball)"
+at = "0 s"
+equals = "24.85 mm"
+tolerance = "1 um"
+"#
+    ));
+    assert!(out.report.passed, "{:#?}", out.report.checks);
+}

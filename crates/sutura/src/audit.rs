@@ -203,8 +203,10 @@ impl Audit {
         true
     }
 
-    /// Boxes around what each element swept, grown so that two overlap when the elements are within a diameter's clearance.
+    /// Boxes around what each element swept, grown so that two overlap when the elements are nearer than any before: only then does
+    /// their clearance matter. What crosses overlaps anyway.
     fn refit(&mut self) {
+        let grow = 1.0 + self.report.thread_clearance.unwrap_or(1.0).max(-0.9);
         if self.trees.len() < self.now.rods.len() {
             self.trees.resize_with(self.now.rods.len(), BoxTree::default);
         }
@@ -215,7 +217,7 @@ impl Audit {
                 if let Some(old) = self.before.element_before(rod, e) {
                     b = b.union(&Aabb::around(&old));
                 }
-                tree.set(e, b.grown(2.0 * rod.radius));
+                tree.set(e, b.grown(grow * rod.radius));
             }
             tree.refit();
         }
@@ -255,16 +257,16 @@ impl Audit {
             seen[k].pose = shape.pose;
             seen[k].alive = true;
             for (rod, tree) in now.rods.iter().zip(trees.iter()) {
-                let mut element = |e: usize| thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
+                let element = |report: &mut AuditReport, e: usize| thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
                 match &seen[k].bounds {
                     Some(bounds) => {
-                        let reach = bounds.swept(&old_pose.unwrap_or(shape.pose), &shape.pose).grown(rod.radius);
+                        let reach = bounds.swept(&old_pose.unwrap_or(shape.pose), &shape.pose).grown(near_shape(report, rod.radius));
                         tree.any(&reach, &mut |e| {
-                            element(e);
+                            element(report, e);
                             false
                         });
                     }
-                    None => (0..rod.n_particles - 1).for_each(element),
+                    None => (0..rod.n_particles - 1).for_each(|e| element(report, e)),
                 }
             }
         }
@@ -289,6 +291,11 @@ impl AuditReport {
             self.crossings.push(Crossing { time, what });
         }
     }
+}
+
+/// Distance from a surface under which clearance matters: less than ever before, at first less than a diameter.
+fn near_shape(report: &AuditReport, radius: f64) -> f64 {
+    radius * (1.0 + 2.0 * report.shape_clearance.unwrap_or(1.0).max(-0.5))
 }
 
 fn lerp(from: [DVec3; 2], to: [DVec3; 2], t: f64) -> [DVec3; 2] {
@@ -323,7 +330,7 @@ fn thread_and_shape(report: &mut AuditReport, time: f64, rod: &SeenRod, e: usize
     let p = seen_from(&shape.pose, now.element(rod, e));
     let old = before.element_before(rod, e).zip(old_pose).map_or(p, |(x, pose)| seen_from(&pose, x));
     let rate = p[0].distance(old[0]).max(p[1].distance(old[1]));
-    let near = 3.0 * rod.radius; // A clearance of one diameter.
+    let near = near_shape(report, rod.radius);
     let what = Pair::Shape { thread: (rod.slot, e), shape: shape.slot };
     let mut look = |d: f64, limit: f64, swept: &dyn Fn(f64) -> f64| {
         let clearance = (d - rod.radius) / (2.0 * rod.radius);

@@ -291,18 +291,17 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     let mut views: Vec<(Invariants, Vec<Part>)> = Vec::new();
     let mut problem = None;
     for _ in 0..PROJECTIONS {
-        match view(&polygon, rng).ok_or(Problem::Degenerate).and_then(|v| identify(&v)) {
+        match view(&polygon, rng).and_then(|v| identify(&v)) {
             Ok(v) => views.push(v),
             Err(p) => problem = Some(p),
         }
     }
-    let has_name = |v: &(Invariants, Vec<Part>)| v.1.iter().all(|p| p.prime.is_some());
     // What could have a name is worth looking at from more sides for a simpler view, which replaces one with the same invariants.
     for _ in 0..MORE_VIEWS {
         if views.iter().any(|v| v.1.iter().all(|p| p.prime.is_some())) || !views.iter().any(|v| could_have_name(&v.0)) {
             break;
         }
-        let Some(Ok(better)) = view(&polygon, rng).map(|v| identify(&v)) else { continue };
+        let Ok(better) = view(&polygon, rng).and_then(|v| identify(&v)) else { continue };
         if let Some(k) = views.iter().position(|v| v.0 == better.0 && crossings(&v.1) > crossings(&better.1)) {
             views[k] = better;
         }
@@ -346,28 +345,37 @@ fn crossings(parts: &[Part]) -> usize {
     parts.iter().map(|p| p.crossings).sum()
 }
 
-/// The connected summands seen from a random direction, the simplest of a few. `None` when none was in general position.
-fn view(polygon: &[DVec3], rng: &mut Rng) -> Option<Vec<Diagram>> {
+/// The connected summands seen from a random direction, the simplest of a few.
+fn view(polygon: &[DVec3], rng: &mut Rng) -> Result<Vec<Diagram>, Problem> {
     const DIRECTIONS: usize = 4;
     const ATTEMPTS: usize = 16;
+    // Beyond these, before and after the first simplification, the rest would take long and hardly ever lead to a name.
+    const MOST_SEEN: usize = 4000;
+    const MOST_LAID: usize = 400;
     let mut turned = Vec::new();
-    let mut simplest: Option<Diagram> = None;
+    let mut simplest: Result<Diagram, Problem> = Err(Problem::Degenerate);
     let mut seen = 0;
     for _ in 0..ATTEMPTS {
         let turn = rng.rotation();
         turned.clear();
         turned.extend(polygon.iter().map(|p| turn * *p));
-        let Some(mut diagram) = Diagram::project(&turned) else { continue };
-        diagram.simplify();
-        if simplest.as_ref().is_none_or(|s| diagram.n_crossings() < s.n_crossings()) {
-            simplest = Some(diagram);
+        match Diagram::project(&turned, MOST_SEEN) {
+            Ok(mut diagram) => {
+                diagram.simplify();
+                if simplest.as_ref().map_or(true, |s| diagram.n_crossings() < s.n_crossings()) {
+                    simplest = Ok(diagram);
+                }
+                seen += 1;
+            }
+            Err(Problem::Degenerate) => {}
+            Err(problem) => return Err(problem),
         }
-        seen += 1;
         if seen == DIRECTIONS {
             break;
         }
     }
-    simplest.map(Diagram::summands)
+    let simplest = simplest?;
+    if simplest.n_crossings() > MOST_LAID { Err(Problem::TooTangled) } else { Ok(simplest.summands()) }
 }
 
 /// What the summands are, and the invariants of their sum.

@@ -229,7 +229,8 @@ fn stacks_of_throws_are_named_closed_held_and_free() {
 /// and polynomials of KnotInfo.
 #[test]
 fn knots_that_only_resemble_are_unknown_with_their_invariants() {
-    let table: [(&str, usize, &[i32], u64, u32, &[i64]); 11] = [
+    type Row = (&'static str, usize, &'static [i32], u64, u32, &'static [i64]);
+    let table: [Row; 11] = [
         ("5_2", 3, &[1, 1, 1, 2, -1, 2], 7, 2, &[2, -3, 2]),
         ("6_1", 4, &[1, 1, 2, -1, -3, 2, -3], 9, 0, &[2, -5, 2]),
         ("7_4", 4, &[1, 1, 2, -1, 2, 2, 3, -2, 3], 15, 2, &[4, -7, 4]),
@@ -337,6 +338,13 @@ fn input_that_makes_no_sense_is_a_problem_and_no_panic() {
     for (points, ends, problem) in cases {
         let r = recognize(&points, ends, 0);
         assert_eq!((r.knot, r.problem), (KnotType::Unknown, Some(problem)), "{points:?} {ends:?}");
+    }
+    // A ball of string is given up, soon.
+    let mut random = Random(5);
+    let tangle: Vec<DVec3> = (0..1000).map(|_| random.vector()).collect();
+    for ends in [Ends::Closed, Ends::Free] {
+        let r = recognize(&tangle, ends, 0);
+        assert_eq!((r.knot, r.problem), (KnotType::Unknown, Some(Problem::TooTangled)));
     }
     // A curve through itself has no knot type: any answer but a knot.
     let eight: Vec<DVec3> = (0..40).map(|k| f64::from(k) * TAU / 40.0).map(|t| DVec3::new(t.sin(), (2.0 * t).sin(), 0.0)).collect();

@@ -16,10 +16,18 @@ pub(super) fn segment_solid(p: [DVec3; 2], solid: &Geometry) -> f64 {
         Geometry::Plane => p[0].z.min(p[1].z),
         Geometry::Sphere { radius } => point_segment(DVec3::ZERO, p) - radius,
         Geometry::Capsule { radius, half_length } => segments(p, [DVec3::Z * -*half_length, DVec3::Z * *half_length]) - radius,
-        Geometry::Cylinder { radius, half_length } => least_along(p, |x| {
-            let (side, cap) = (x.x.hypot(x.y) - radius, x.z.abs() - half_length);
-            side.max(0.0).hypot(cap.max(0.0)) + side.max(cap).min(0.0)
-        }),
+        Geometry::Cylinder { radius, half_length } => {
+            // Beside the cylinder only the distance from the axis counts: the common case, and a quick one.
+            let across = p.map(|x| DVec3::new(x.x, x.y, 0.0));
+            let beside = point_segment(DVec3::ZERO, across) - radius;
+            if beside >= 0.0 && p[0].z.abs().max(p[1].z.abs()) <= *half_length {
+                return beside;
+            }
+            least_along(p, |x| {
+                let (side, cap) = (x.x.hypot(x.y) - radius, x.z.abs() - half_length);
+                side.max(0.0).hypot(cap.max(0.0)) + side.max(cap).min(0.0)
+            })
+        }
         Geometry::Box { half_sides } => least_along(p, |x| {
             let outside = x.abs() - *half_sides;
             outside.max(DVec3::ZERO).length() + outside.max_element().min(0.0)

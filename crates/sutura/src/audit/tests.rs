@@ -134,7 +134,7 @@ fn a_thread_laid_on_a_shape_touches_it_and_drawn_through_is_found() {
         let mut audit = Audit::new();
         show(&mut audit, 0.0, 8.0 * R);
         assert_eq!(audit.report().shape_clearance, None, "{geometry:?}");
-        show(&mut audit, 0.1, 1.0 * R);
+        show(&mut audit, 0.1, R);
         let touching = audit.report().clone();
         // Round-off of the pose over the radius.
         assert!(touching.shape_clearance.unwrap().abs() < 1e-9, "{geometry:?} {:?}", touching.shape_clearance);
@@ -156,7 +156,7 @@ fn a_shape_that_moves_through_a_still_thread_is_found() {
         };
         let mut audit = Audit::new();
         show(&mut audit, 0.0, -5.0 * R);
-        show(&mut audit, 0.1, -1.0 * R);
+        show(&mut audit, 0.1, -R);
         show(&mut audit, 0.2, -5.0 * R);
         assert!(!audit.report().passes_through, "{geometry:?}");
         show(&mut audit, 0.3, 2.0 * top + 5.0 * R);
@@ -221,4 +221,40 @@ fn elongation_is_the_largest_seen_of_each_thread() {
     let e = &audit.report().max_elongation;
     assert_eq!((e[0].0, e[1].0), (2, 4));
     assert!(e[0].1 < 1e-12 && (e[1].1 - 0.1).abs() < 1e-12, "{e:?}");
+}
+
+/// What the quick search finds is what a look at all pairs finds, at random states of two tangled threads.
+#[test]
+fn the_least_clearance_is_that_of_all_pairs() {
+    let mut angle = 0.0_f64;
+    for seed in 0..20 {
+        let mut thread = |n: usize| {
+            let mut x = vec![DVec3::new(f64::from(seed) * 3e-5, 0.0, 0.0)];
+            for _ in 0..n {
+                angle += 2.4;
+                let d = DVec3::new(angle.sin(), (1.7 * angle).cos(), (0.6 * angle).sin()).normalize();
+                x.push(x[x.len() - 1] + d * 3.3e-4);
+            }
+            x
+        };
+        let (a, b) = (thread(40), thread(25));
+        let mut least = f64::INFINITY;
+        for (i, p) in a.windows(2).enumerate() {
+            for q in b.windows(2) {
+                least = least.min(segments([p[0], p[1]], [q[0], q[1]]) - 2.0 * R);
+            }
+            // One element between is 3.3 radii of thread, more than pi.
+            for q in a.windows(2).skip(i + 2) {
+                least = least.min(segments([p[0], p[1]], [q[0], q[1]]) - 2.0 * R);
+            }
+        }
+        for q in 0..b.len() - 1 {
+            for p in q + 2..b.len() - 1 {
+                least = least.min(segments([b[p], b[p + 1]], [b[q], b[q + 1]]) - 2.0 * R);
+            }
+        }
+        let mut audit = Audit::new();
+        Scene::default().with_rod(0, R, a).with_rod(1, R, b).show(&mut audit, 0.0);
+        assert_eq!(audit.report().thread_clearance, (least < 2.0 * R).then_some(least / (2.0 * R)), "{seed}");
+    }
 }

@@ -2,6 +2,7 @@
 //! and signature from a Goeritz matrix (Gordon and Litherland 1978), Alexander polynomial from the Wirtinger relations. All of it is
 //! integer arithmetic. A positive crossing is right-handed; a right-handed trefoil has signature -2.
 
+use super::Problem;
 use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
@@ -53,9 +54,9 @@ fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
 }
 
 impl Diagram {
-    /// The view of a closed polygon along z. `None` when it is not in general position (a corner on an edge, three strands in a
-    /// point): another direction must be tried.
-    pub fn project(points: &[DVec3]) -> Option<Self> {
+    /// The view of a closed polygon along z. `Degenerate` when it is not in general position (a corner on an edge, three strands in a
+    /// point): another direction must be tried. `TooTangled` with more than `most` crossings.
+    pub fn project(points: &[DVec3], most: usize) -> Result<Self, Problem> {
         // Nearer than this to each other or to a corner, in parameter of the edge, the order along the strand is in doubt.
         const TIE: f64 = 1e-9;
         let n = points.len();
@@ -82,7 +83,10 @@ impl Diagram {
                 let inside = |t: f64| t > TIE && t < 1.0 - TIE;
                 let volume = side(p, q, r, s);
                 if !inside(u) || !inside(v) || volume == 0 {
-                    return None;
+                    return Err(Problem::Degenerate);
+                }
+                if signs.len() == most {
+                    return Err(Problem::TooTangled);
                 }
                 // With V = (q - p) x (s - r) . (r - p) and d = ((q - p) x (s - r)).z, rs is above pq by V / d.
                 let d = if at_s > at_r { 1 } else { -1 };
@@ -95,9 +99,9 @@ impl Diagram {
         }
         passes.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         if passes.windows(2).any(|w| w[0].0 == w[1].0 && w[1].1 - w[0].1 < TIE) {
-            return None;
+            return Err(Problem::Degenerate);
         }
-        Some(Diagram { code: passes.into_iter().map(|p| p.2).collect(), signs })
+        Ok(Diagram { code: passes.into_iter().map(|p| p.2).collect(), signs })
     }
 
     pub fn n_crossings(&self) -> usize {
@@ -472,8 +476,9 @@ fn signature_of(mut g: Vec<Vec<i128>>) -> Option<(u64, i32)> {
                 let (i, j) = (k..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))).find(|(i, j)| g[*i][*j] != 0)?;
                 g.swap(k, i);
                 g.iter_mut().for_each(|row| row.swap(k, i));
-                for column in k..n {
-                    g[k][column] += g[j][column];
+                let (upper, lower) = g.split_at_mut(j);
+                for (a, b) in upper[k].iter_mut().zip(&lower[0]).skip(k) {
+                    *a += b;
                 }
                 for row in g.iter_mut().skip(k) {
                     row[k] += row[j];

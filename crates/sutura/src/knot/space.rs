@@ -130,9 +130,18 @@ pub(crate) fn segments(p: [DVec3; 2], q: [DVec3; 2]) -> f64 {
     let (a, b, c, d, e) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
     let det = a * c - b * b;
     let (s, t) = (b * e - c * d, a * e - b * d);
-    let inside = if s > 0.0 && s < det && t > 0.0 && t < det { (w + u * (s / det) - v * (t / det)).length() } else { f64::INFINITY };
-    // The ends always count: for nearly parallel segments the perpendicular is mostly round-off.
-    inside.min(point_segment(p[0], q)).min(point_segment(p[1], q)).min(point_segment(q[0], p)).min(point_segment(q[1], p))
+    let mut distance = f64::INFINITY;
+    if s > 0.0 && s < det && t > 0.0 && t < det {
+        distance = (w + u * (s / det) - v * (t / det)).length();
+        if det > 1e-8 * a * c {
+            return distance;
+        }
+        // Nearly parallel: the place of the perpendicular is mostly round-off, and an end may be nearer.
+    }
+    for (x, segment) in [(p[0], q), (p[1], q), (q[0], p), (q[1], p)] {
+        distance = distance.min(point_segment(x, segment));
+    }
+    distance
 }
 
 /// Distance of a segment from a triangle, zero where it goes through.

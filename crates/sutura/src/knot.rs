@@ -290,10 +290,15 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     }
     let mut views: Vec<(Invariants, Vec<Part>)> = Vec::new();
     let mut problem = None;
-    for _ in 0..PROJECTIONS {
+    let mut failed = 0;
+    while (views.len() as u32) < PROJECTIONS && failed < PROJECTIONS {
         match view(&polygon, rng).and_then(|v| identify(&v)) {
             Ok(v) => views.push(v),
-            Err(p) => problem = Some(p),
+            Err(p) => {
+                // A view that cannot be read says nothing against the others; it is taken again, not for ever.
+                problem = Some(p);
+                failed += 1;
+            }
         }
     }
     // What could have a name is worth looking at from more sides for a simpler view, which replaces one with the same invariants.

@@ -3,8 +3,10 @@
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
+use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::knot::{Ends, Hand, KnotType, Problem, Recognition, Throws, entries, gauss_linking, recognize, writhe};
+use sutura::{Material, RodSpec, Settings, World};
 
 fn read(name: &str) -> Vec<DVec3> {
     let path = format!("{}/tests/polylines/{name}.csv", env!("CARGO_MANIFEST_DIR"));
@@ -568,4 +570,23 @@ fn entries_of_nothing_are_none() {
     let mut bad = straight.clone();
     bad[7].y = f64::NAN;
     assert_eq!(entries(&bad, &lengths(&straight), 0.5), None);
+}
+
+#[test]
+fn the_audit_sees_every_substep_of_a_world() {
+    let mut world = World::new(Settings::default()).unwrap();
+    let (from, to) = (DVec3::ZERO, DVec3::X * 0.05);
+    let rod = world.insert_rod(&RodSpec::straight(from, to, 50, 1e-4, Material::elastic(2e9, 1150.0))).unwrap();
+    let mut audit = Audit::new();
+    let mut substeps = 0;
+    for _ in 0..6 {
+        substeps += u64::from(world.step_with(1.0 / 60.0, &mut |view| audit.observe(view)).substeps);
+    }
+    let report = audit.report();
+    assert_eq!((report.states, report.states_not_finite, report.passes_through), (substeps, 0, false));
+    assert_eq!((report.thread_clearance, report.shape_clearance), (None, None));
+    // It falls freely: g t^2 / 2 is 49 mm, and nothing stretches it beyond round-off of its position over its element length.
+    assert!(world.rod(rod).unwrap().positions()[0].z < -0.04);
+    assert_eq!(report.max_elongation[0].0, rod.index());
+    assert!(report.max_elongation[0].1 < 1e-9, "{:?}", report.max_elongation);
 }

@@ -1027,6 +1027,14 @@ mod tests {
     }
 
     #[test]
+    fn every_function_is_documented() {
+        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md")).unwrap();
+        for name in function_names() {
+            assert!(text.contains(&format!("`{name}")) || text.contains(&format!(" {name} ")) || text.contains(&format!(" {name}`")), "{name}");
+        }
+    }
+
+    #[test]
     fn deep_nesting_is_refused_not_overflowed() {
         let deep = "(".repeat(100_000) + "1" + &")".repeat(100_000);
         assert!(Expr::parse(&deep, &names()).is_err());

@@ -74,9 +74,19 @@ pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
     KnotReport { name: recognition.knot.name().into(), determinant: recognition.determinant, signature: i64::from(recognition.signature), tried, agreed }
 }
 
-/// Writhe of a thread in turns, its ends joined far away along the tangents there.
+/// How far the ends are extended for the writhe, in lengths of the thread. What joins them there counts for about 1 / this.
+const TAILS: f64 = 1e4;
+
+/// Writhe of a thread in turns, its ends extended far along the tangents there: twist + writhe of a thread held by two clamps then
+/// changes by their turning alone, and jumps by 2 where the thread passes through itself.
 pub fn writhe(rod: &RodView<'_>) -> f64 {
-    knot::writhe(rod.positions(), false)
+    let points = rod.positions();
+    let tail = |from: DVec3, to: DVec3| to + (to - from).normalize_or_zero() * (TAILS * rod.rest_length());
+    let n = points.len();
+    let mut extended = vec![tail(points[1], points[0])];
+    extended.extend_from_slice(points);
+    extended.push(tail(points[n - 2], points[n - 1]));
+    knot::writhe(&extended, false)
 }
 
 /// Where a thread enters its knot.

@@ -371,7 +371,7 @@ impl Runner {
             Geometry::Cylinder { radius, half_length } => ShapeOutline::Cylinder { radius: *radius, half_length: *half_length },
             Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
             Geometry::Mesh { vertices, triangles } => {
-                ShapeOutline::Mesh { vertices: vertices.iter().map(|v| v.to_array()).collect(), triangles: triangles.clone() }
+                ShapeOutline::Mesh { vertices: vertices.iter().map(DVec3::to_array).collect(), triangles: triangles.clone() }
             }
         };
         let thread = |t: &crate::scene::ThreadDef| Thread { name: t.name.clone(), radius: t.spec.radius, elements: t.spec.centerline.len() - 1 };

@@ -659,7 +659,7 @@ impl Live for Stage {
             Read::D2 => Value::Vector(self.orientation(place) * DVec3::Y),
             Read::D3 => Value::Vector(self.orientation(place) * DVec3::Z),
             Read::Orientation => Value::Columns(self.orientation(place).to_array().to_vec()),
-            Read::Tension => Value::Number(self.at_element(args, |r, j| r.tension(j))),
+            Read::Tension => Value::Number(self.at_element(args, |r, j| r.internal_force(j).z)),
             Read::Shear => Value::Number(self.at_element(args, |r, j| r.internal_force(j).truncate().length())),
             Read::Moment => Value::Vector(self.on_thread(place).and_then(|(rod, p)| Some(rod.moment(joint_of(&rod, p)?))).unwrap_or(DVec3::NAN)),
             Read::Bending => Value::Number(self.at_joint(args, |r, j| r.moment(j).truncate().length())),

@@ -1,0 +1,356 @@
+//! Threads and shapes.
+
+use super::*;
+
+/// Most elements of one thread: far beyond what runs in real time, and a slip of the pen must not fill the memory.
+const MAX_ELEMENTS: i64 = 200_000;
+
+impl<'d> Loader<'d> {
+    pub(super) fn thread(&mut self, table: &Table<'d>) {
+        let index = self.threads.len();
+        let name = table.need("name", "the name of the thread").and_then(|v| v.text()).map_or(format!("thread{index}"), std::borrow::Cow::into_owned);
+        let radius = self.thickness(table);
+        let material = self.material(table);
+        let stretch = table.get("stretch").and_then(|v| v.choice(&[("elastic", Stretch::Elastic), ("inextensible", Stretch::Inextensible)]));
+        let surface = self.surface(table, 0);
+        let knot = table.truth_or("knot", false);
+        let points = self.centerline(table, None);
+        let hint = table.vector("d1", Dim::NUMBER);
+        let twist = table.quantity_or("twist", Dim::ANGLE, 0.0);
+        let rest_value = table.get("rest");
+        let (Some(points), Some(radius), Some(material)) = (points, radius, material) else {
+            // What is missing was reported; a stand-in keeps the numbers of the following threads right.
+            if let Some(rest) = rest_value {
+                let _ = self.rest(&rest, 1);
+            }
+            let spec = RodSpec::straight(DVec3::ZERO, DVec3::X, 1, 1e-3, Material::elastic(1e9, 1e3));
+            self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
+            return;
+        };
+        let mut spec = RodSpec::new(points, radius, material);
+        spec.stretch = stretch.unwrap_or(Stretch::Elastic);
+        spec.surface = surface;
+        if let Some(rest) = rest_value {
+            spec.rest = self.rest(&rest, spec.centerline.len() - 1).unwrap_or(RestShape::Straight);
+        }
+        if hint.is_some() || twist != 0.0 {
+            spec.frames = frames(&spec.centerline, hint, twist);
+        }
+        self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
+    }
+
+    pub(super) fn thickness(&self, table: &Table<'d>) -> Option<f64> {
+        let preset = table.get("size").and_then(|v| match presets::find_size(&v.text()?) {
+            Ok(size) => Some(0.5 * size.diameter.value),
+            Err(e) => {
+                v.problem(e.to_string(), None);
+                None
+            }
+        });
+        let radius = positive(table, "radius", Dim::LENGTH);
+        let diameter = positive(table, "diameter", Dim::LENGTH).map(|d| 0.5 * d);
+        let found = radius.or(diameter).or(preset);
+        if found.is_none() && !["size", "radius", "diameter"].iter().any(|k| table.has(k)) {
+            table.problem("`size`, `diameter` or `radius` is missing", None);
+        }
+        found
+    }
+
+    pub(super) fn material(&self, table: &Table<'d>) -> Option<Material> {
+        let mut failed = false;
+        let preset = table.get("material").and_then(|v| match presets::find_material(&v.text()?) {
+            Ok(m) => Some(m),
+            Err(e) => {
+                v.problem(e.to_string(), None);
+                failed = true;
+                None
+            }
+        });
+        let e = positive(table, "young_modulus", Dim::PRESSURE).or(preset.map(|p| p.young_modulus.value));
+        let density = positive(table, "density", Dim::DENSITY).or(preset.map(|p| p.density.value));
+        let nu = in_range(table, "poisson_ratio", Dim::NUMBER, -0.999_999, 0.5);
+        let g = positive(table, "shear_modulus", Dim::PRESSURE);
+        if nu.is_some() && g.is_some() {
+            table.problem("`poisson_ratio` and `shear_modulus` exclude each other", None);
+        }
+        let bend_scale = in_range(table, "bend_scale", Dim::NUMBER, 1e-12, 1.0).or(preset.map(|p| p.bend_scale.value)).unwrap_or(1.0);
+        let bend_damping = in_range(table, "bend_damping", Dim::TIME, 0.0, 1e6).or(preset.map(|p| p.bend_damping.value)).unwrap_or(0.0);
+        let plasticity = table.get("plasticity").and_then(|v| {
+            let t = v.table()?;
+            let yield_curvature = t.need("yield_curvature", "a curvature (1/m)").and_then(|v| positive_value(&v, Dim::CURVATURE));
+            let yield_twist = positive(&t, "yield_twist", Dim::CURVATURE);
+            let hardening = in_range(&t, "hardening", Dim::NUMBER, 0.0, 0.999_999).unwrap_or(0.0);
+            t.finish();
+            let yield_curvature = yield_curvature?;
+            Some(Plasticity { yield_curvature, yield_twist: yield_twist.unwrap_or(yield_curvature), hardening })
+        });
+        let (Some(young_modulus), Some(density)) = (e, density) else {
+            if !failed && !table.has("young_modulus") {
+                table.problem("`material` or `young_modulus` is missing", Some(format!("materials: {}", names_of_materials())));
+            } else if !failed && !table.has("density") {
+                table.problem("`density` is missing (or name a `material`)", None);
+            }
+            return None;
+        };
+        let shear = match (g, nu) {
+            (Some(g), _) => Shear::Modulus(g),
+            (None, Some(nu)) => Shear::Poisson(nu),
+            (None, None) => Shear::Poisson(preset.map_or(0.4, |p| p.poisson_ratio.value)),
+        };
+        Some(Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity })
+    }
+
+    /// The particles of a thread (or of a rest shape with a given number of elements).
+    pub(super) fn centerline(&self, table: &Table<'d>, given: Option<usize>) -> Option<Vec<DVec3>> {
+        const SHAPES: [&str; 5] = ["line", "arc", "helix", "points", "path"];
+        let elements = match given {
+            Some(n) => Some(n),
+            None => table.get("elements").and_then(|v| v.integer(1, MAX_ELEMENTS)).map(|n| n as usize),
+        };
+        let found: Vec<Value<'d>> = SHAPES.iter().filter_map(|k| table.get(k)).collect();
+        let [shape] = found.as_slice() else {
+            let message = if found.is_empty() { "the shape is missing" } else { "more than one shape is given" };
+            table.problem(message, Some(format!("one of: {}", SHAPES.join(", "))));
+            return None;
+        };
+        let curve = if table.has("line") {
+            let t = shape.table()?;
+            let from = t.need_vector("from", Dim::LENGTH);
+            let to = match (t.get("to"), t.get("direction")) {
+                (Some(to), None) => to.vector(Dim::LENGTH),
+                (None, Some(d)) => {
+                    let (d, length) = (d.direction(), t.need("length", "a length").and_then(|v| positive_value(&v, Dim::LENGTH)));
+                    from.zip(d).zip(length).map(|((from, d), l)| from + d * l)
+                }
+                _ => {
+                    t.problem("either `to`, or `direction` and `length`", None);
+                    None
+                }
+            };
+            t.finish();
+            Curve::new(vec![Piece::Line { from: from?, to: to? }])
+        } else if table.has("arc") {
+            let t = shape.table()?;
+            let (center, axis, start) =
+                (t.need_vector("center", Dim::LENGTH), t.need("axis", "a direction").and_then(|v| v.direction()), t.need_vector("start", Dim::LENGTH));
+            let angle = t.need_quantity("angle", Dim::ANGLE);
+            t.finish();
+            Curve::new(vec![curve::turn(start?, center?, axis?, angle?, 0.0)])
+        } else if table.has("helix") {
+            let t = shape.table()?;
+            let (center, axis, start) =
+                (t.need_vector("center", Dim::LENGTH), t.need("axis", "a direction").and_then(|v| v.direction()), t.need_vector("start", Dim::LENGTH));
+            let (pitch, turns) = (t.need_quantity("pitch", Dim::LENGTH), t.get("turns").and_then(|v| v.quantity(Dim::NUMBER)));
+            let length = positive(&t, "length", Dim::LENGTH);
+            if turns.is_some() == length.is_some() {
+                t.problem("either `turns` or `length` of the thread", None);
+            }
+            t.finish();
+            let (center, axis, start, pitch) = (center?, axis?, start?, pitch?);
+            let arm = start - center;
+            let radius = (arm - axis * axis.dot(arm)).length();
+            let turns = turns.or_else(|| length.map(|l| l / (std::f64::consts::TAU * radius).hypot(pitch)))?;
+            Curve::new(vec![curve::helix(start, center, axis, turns, pitch)])
+        } else if table.has("points") {
+            let points = self.points(shape)?;
+            // As they are, unless a number of elements is wanted.
+            match elements {
+                Some(n) if n + 1 != points.len() => Curve::through(&points),
+                _ if points.len() < 2 => {
+                    shape.problem("at least two points are wanted", None);
+                    return None;
+                }
+                _ => return Some(points),
+            }
+        } else {
+            self.path(shape)?
+        };
+        let Some(n) = elements else {
+            if !table.has("elements") {
+                table.problem("`elements` is missing: the number of elements", None);
+            }
+            return None;
+        };
+        let cut = curve.cut(n).filter(|p| p.iter().all(|x| x.is_finite()));
+        if cut.is_none() {
+            shape.problem("it has no length, or is too large", None);
+        }
+        cut
+    }
+
+    /// Points inline, or `{ file = "..", unit = "mm" }`.
+    pub(super) fn points(&self, value: &Value<'d>) -> Option<Vec<DVec3>> {
+        if !value.is_table() {
+            return value.array("an array of points, or { file = \"..\", unit = \"mm\" }")?.iter().map(|v| v.vector(Dim::LENGTH)).collect();
+        }
+        let t = value.table()?;
+        let unit = file_unit(&t);
+        let text = t.need("file", "a file with three numbers a line").and_then(|v| self.file(&v));
+        t.finish();
+        match curve::read_points(&text?, unit?) {
+            Ok(points) => Some(points),
+            Err(e) => {
+                value.problem(e, None);
+                None
+            }
+        }
+    }
+
+    /// Pieces one after the other: `from`, then `line_to`, `line_by`, `arc`.
+    pub(super) fn path(&self, value: &Value<'d>) -> Option<Curve> {
+        let mut pieces = Vec::new();
+        let mut here: Option<DVec3> = None;
+        let mut fine = true;
+        for (i, item) in value.array("an array of pieces, the first { from = [x, y, z] }")?.iter().enumerate() {
+            let t = item.table()?;
+            let to = if i == 0 {
+                here = t.need_vector("from", Dim::LENGTH);
+                t.finish();
+                fine &= here.is_some();
+                continue;
+            } else if let Some(v) = t.get("line_to") {
+                v.vector(Dim::LENGTH).zip(here).map(|(to, from)| Piece::Line { from, to })
+            } else if let Some(v) = t.get("line_by") {
+                v.vector(Dim::LENGTH).zip(here).map(|(by, from)| Piece::Line { from, to: from + by })
+            } else if let Some(v) = t.get("arc") {
+                let a = v.table()?;
+                let (center, axis) = (a.need_vector("center", Dim::LENGTH), a.need("axis", "a direction").and_then(|v| v.direction()));
+                let (angle, advance) = (a.need_quantity("angle", Dim::ANGLE), a.quantity_or("advance", Dim::LENGTH, 0.0));
+                a.finish();
+                center.zip(axis).zip(angle).zip(here).map(|(((center, axis), angle), start)| curve::turn(start, center, axis, angle, advance))
+            } else {
+                item.problem("a piece is one of: line_to, line_by, arc", None);
+                None
+            };
+            t.finish();
+            match to {
+                Some(piece) => {
+                    here = Some(piece.at(1.0));
+                    pieces.push(piece);
+                }
+                None => fine = false,
+            }
+        }
+        // A piece without length has no direction.
+        pieces.retain(|p| p.length() > 0.0);
+        fine.then(|| Curve::new(pieces))
+    }
+
+    pub(super) fn rest(&self, value: &Value<'d>, n: usize) -> Option<RestShape> {
+        if value.is_text() {
+            return value.choice(&[("straight", RestShape::Straight), ("as_inserted", RestShape::AsInserted)]);
+        }
+        let t = value.table()?;
+        let shaped = ["line", "arc", "helix", "points", "path"].iter().any(|k| t.has(k));
+        if shaped {
+            let points = self.centerline(&t, Some(n));
+            let twist = t.quantity_or("twist", Dim::ANGLE, 0.0);
+            let hint = t.vector("d1", Dim::NUMBER);
+            t.finish();
+            let points = points?;
+            let q = frames(&points, hint, twist)?;
+            let lengths: Vec<f64> = points.windows(2).map(|p| p[0].distance(p[1])).collect();
+            let darboux = (1..n).map(|j| log((q[j - 1].conjugate() * q[j]).normalize()) / (0.5 * (lengths[j - 1] + lengths[j]))).collect();
+            return Some(RestShape::Given { lengths: Some(lengths), darboux: Some(darboux) });
+        }
+        let curvature = match t.get("curvature") {
+            Some(v) if v.is_array() => match v.quantities(Dim::CURVATURE, "two curvatures, about d1 and d2")?.as_slice() {
+                [a, b] => Some((*a, *b)),
+                _ => {
+                    v.problem("wanted two curvatures, about d1 and d2", None);
+                    None
+                }
+            },
+            Some(v) => v.quantity(Dim::CURVATURE).map(|k| (k, 0.0)),
+            None => Some((0.0, 0.0)),
+        };
+        let twist = t.quantity_or("twist", Dim::CURVATURE, 0.0);
+        let length = positive(&t, "length", Dim::LENGTH);
+        t.finish();
+        let (k1, k2) = curvature?;
+        Some(RestShape::Given { lengths: length.map(|l| vec![l / n as f64; n]), darboux: Some(vec![DVec3::new(k1, k2, twist); n.saturating_sub(1)]) })
+    }
+
+    pub(super) fn shape(&mut self, table: &Table<'d>) {
+        let index = self.shapes.len();
+        let name = table.need("name", "the name of the shape").and_then(|v| v.text()).map_or(format!("shape{index}"), std::borrow::Cow::into_owned);
+        let geometry = self.geometry(table);
+        let position = table.vector("position", Dim::LENGTH).unwrap_or(DVec3::ZERO);
+        let orientation = orientation(table, Some(DQuat::IDENTITY)).unwrap_or(DQuat::IDENTITY);
+        let surface = self.surface(table, 1);
+        // A stand-in for what was reported keeps the numbers of the following shapes right.
+        let geometry = geometry.unwrap_or(Geometry::Sphere { radius: 1.0 });
+        // Any shape may be moved or pushed by an action; one that never is stays where it is.
+        let spec = ShapeSpec { geometry, pose: Pose::new(position, orientation), surface, motion: ShapeMotion::Driven };
+        self.shapes.push(ShapeDef { name, spec, location: table.location() });
+    }
+
+    pub(super) fn geometry(&self, table: &Table<'d>) -> Option<Geometry> {
+        let kinds = [("plane", 0), ("sphere", 1), ("capsule", 2), ("cylinder", 3), ("box", 4), ("mesh", 5)];
+        let kind = table.need("kind", "plane, sphere, capsule, cylinder, box or mesh")?.choice(&kinds)?;
+        let length = |key: &str| table.need(key, "a length").and_then(|v| positive_value(&v, Dim::LENGTH));
+        match kind {
+            0 => Some(Geometry::Plane),
+            1 => Some(Geometry::Sphere { radius: length("radius")? }),
+            2 | 3 => {
+                let (radius, half_length) = (length("radius"), length("length").map(|l| 0.5 * l));
+                let (radius, half_length) = (radius?, half_length?);
+                Some(if kind == 2 { Geometry::Capsule { radius, half_length } } else { Geometry::Cylinder { radius, half_length } })
+            }
+            4 => {
+                let sides = table.need("sides", "three lengths")?;
+                let half_sides = sides.vector(Dim::LENGTH)? * 0.5;
+                if half_sides.min_element() <= 0.0 {
+                    sides.problem("sides must be > 0", None);
+                    return None;
+                }
+                Some(Geometry::Box { half_sides })
+            }
+            _ => {
+                if let Some(file) = table.get("file") {
+                    let unit = file_unit(table);
+                    let text = self.file(&file)?;
+                    return match curve::read_obj(&text, unit?) {
+                        Ok((vertices, triangles)) => Some(Geometry::Mesh { vertices, triangles }),
+                        Err(e) => {
+                            file.problem(e, None);
+                            None
+                        }
+                    };
+                }
+                let vertices: Option<Vec<DVec3>> = table
+                    .need("vertices", "corners, or a `file`")
+                    .and_then(|v| v.array("an array of corners")?.iter().map(|v| v.vector(Dim::LENGTH)).collect());
+                let triangles: Option<Vec<[u32; 3]>> = table.need("triangles", "three corner numbers each, from 0").and_then(|v| {
+                    v.array("an array of triangles")?
+                        .iter()
+                        .map(|v| {
+                            let corners: Vec<u32> = v.array("three corner numbers")?.iter().filter_map(|c| c.integer(0, 1 << 30)).map(|c| c as u32).collect();
+                            <[u32; 3]>::try_from(corners).ok().or_else(|| {
+                                v.problem("a triangle has three corners", None);
+                                None
+                            })
+                        })
+                        .collect()
+                });
+                Some(Geometry::Mesh { vertices: vertices?, triangles: triangles? })
+            }
+        }
+    }
+}
+
+fn names_of_materials() -> String {
+    presets::materials().iter().map(|m| m.name).collect::<Vec<_>>().join(", ")
+}
+
+/// Frames along points, the first director nearest to `hint`, turned evenly by `twist` over the length.
+fn frames(points: &[DVec3], hint: Option<DVec3>, twist: f64) -> Option<Vec<DQuat>> {
+    let distinct = points.windows(2).all(|p| p[0].distance(p[1]) > 0.0);
+    if !distinct {
+        return None; // the engine names the two points
+    }
+    let bend = points.windows(3).map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize())).find(|c| c.length() > 1e-6);
+    let q = transported_frames(points, hint.or(bend).unwrap_or(DVec3::ZERO));
+    let n = q.len() as f64;
+    Some(q.iter().enumerate().map(|(i, q)| (*q * exp(DVec3::Z * (twist * (i as f64 + 0.5) / n))).normalize()).collect())
+}

@@ -127,7 +127,7 @@ fn knot(name: &str, rod_ns: Option<f64>) -> anyhow::Result<Knot> {
     let elements: usize = r.threads.iter().map(|t| t.elements).sum();
     let frame = outcome.series.iter().find(|s| s.name == "frame");
     let column = |name: &str| frame.and_then(|f| f.column(name));
-    let per_contact = match (rod_ns, column("contacts"), column("newton_iterations")) {
+    let per_contact = match (rod_ns, column("contacts"), column("newton")) {
         (Some(rod_ns), Some(contacts), Some(newton)) => {
             let rows: f64 = contacts.iter().zip(&newton).map(|(c, n)| c * n).sum();
             let rods = rod_ns * elements as f64 * newton.iter().sum::<f64>();

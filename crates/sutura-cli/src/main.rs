@@ -56,10 +56,11 @@ fn say_json<T: serde::Serialize>(value: &T) -> anyhow::Result<()> {
     say(&serde_json::to_string_pretty(value)?)
 }
 
-/// A table without borders but lines under its headings; `numbers` are the columns to align to the right.
+/// A table with a line under its headings; `numbers` are the columns to align to the right.
 fn table(headings: &[&str], numbers: &[usize]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
-    table.load_style(comfy_table::presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
+    let line = comfy_table::LineStyle::none().fill('─').junction('─');
+    table.load_style(comfy_table::TableStyle::new().header_separator(line)).set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
     table.set_header(headings.iter().copied());
     for &column in numbers {
         if let Some(column) = table.column_mut(column) {

@@ -80,10 +80,11 @@ impl Figure {
         let range = |pick: fn(&(f64, f64)) -> f64| shown().map(|p| pick(&p)).fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(v), a.1.max(v)));
         let (x, y) = (range(|p| p.0), range(|p| p.1));
         let x = if x.1 > x.0 { x } else { (x.0 - 0.5, x.0 + 0.5) };
-        let frame = Frame { figure: self, factor, unit, x };
-        if self.log {
+        let frame = Frame { figure: self, factor, unit, x, largest: largest * factor };
+        // Under a factor of eight a logarithmic ordinate would have hardly a mark.
+        if self.log && y.1 > 8.0 * y.0 {
             let (low, high) = (y.0 * factor, y.1 * factor);
-            frame.draw(area, ((low / 1.3)..(high * 1.6).max(low * 10.0)).log_scale())
+            frame.draw(area, (low / 1.3..high * 1.6).log_scale())
         } else {
             let (mut low, mut high) = (y.0 * factor, y.1 * factor);
             // An ordinate that begins near zero is shown from zero.
@@ -104,6 +105,8 @@ struct Frame<'a> {
     factor: f64,
     unit: String,
     x: (f64, f64),
+    /// Largest magnitude of an ordinate, as shown.
+    largest: f64,
 }
 
 impl Frame<'_> {
@@ -140,8 +143,8 @@ impl Frame<'_> {
             .y_desc(named((&figure.y.0, &self.unit)))
             .axis_desc_style(font(13))
             .label_style(font(11))
-            .x_label_formatter(&|v| number(*v))
-            .y_label_formatter(&|v| number(*v))
+            .x_label_formatter(&|v| number(if v.abs() < 1e-9 * (x.1 - x.0) { 0.0 } else { *v }))
+            .y_label_formatter(&|v| number(if v.abs() < 1e-9 * self.largest { 0.0 } else { *v }))
             .set_all_tick_mark_size(px(4))
             .draw()?;
         // A name that does not fit is left out: the report lists the phases.
@@ -183,19 +186,19 @@ impl Frame<'_> {
 
     /// Where the legend hides the fewest points of the curves.
     fn emptiest_corner(&self) -> SeriesLabelPosition {
-        use SeriesLabelPosition::{LowerLeft, LowerRight, UpperLeft, UpperRight};
+        use SeriesLabelPosition::{LowerLeft, LowerRight, MiddleLeft, MiddleRight, UpperLeft, UpperRight};
         let figure = self.figure;
         let scale = |v: f64| if figure.log { v.max(f64::MIN_POSITIVE).ln() } else { v };
         let points: Vec<(f64, f64)> =
             figure.lines.iter().flat_map(|l| l.points.iter().copied()).filter(|p| figure.can_show(p)).map(|p| (p.0, scale(p.1))).collect();
         let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, p| (a.0.min(p.1), a.1.max(p.1)));
-        let inside = |p: &(f64, f64), right: bool, upper: bool| {
-            let (u, v) = ((p.0 - self.x.0) / (self.x.1 - self.x.0), (p.1 - low) / (high - low).max(f64::MIN_POSITIVE));
-            (if right { u > 0.7 } else { u < 0.3 }) && (if upper { v > 0.65 } else { v < 0.35 })
+        let share = |p: &(f64, f64)| ((p.0 - self.x.0) / (self.x.1 - self.x.0), (p.1 - low) / (high - low).max(f64::MIN_POSITIVE));
+        let hidden = |right: bool, from: f64, to: f64| {
+            points.iter().map(share).filter(|(u, v)| (if right { *u > 0.75 } else { *u < 0.25 }) && (from..to).contains(v)).count()
         };
-        let count = |right, upper| points.iter().filter(|p| inside(p, right, upper)).count();
-        let corners = [(UpperRight, count(true, true)), (UpperLeft, count(false, true)), (LowerRight, count(true, false)), (LowerLeft, count(false, false))];
-        corners.into_iter().min_by_key(|c| c.1).map_or(UpperRight, |c| c.0)
+        let places = [(UpperRight, true, 0.6, 1.1), (UpperLeft, false, 0.6, 1.1), (LowerRight, true, -0.1, 0.4), (LowerLeft, false, -0.1, 0.4)];
+        let between = [(MiddleRight, true, 0.3, 0.7), (MiddleLeft, false, 0.3, 0.7)];
+        places.into_iter().chain(between).min_by_key(|(_, right, from, to)| hidden(*right, *from, *to)).map_or(UpperRight, |p| p.0)
     }
 }
 

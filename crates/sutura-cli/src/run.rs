@@ -150,20 +150,14 @@ fn figures(outcome: &Outcome) -> Vec<(String, Figure)> {
     all
 }
 
-/// What columns of the series `frame` belong together: file name, title, ordinate, logarithmic or not, and how their names begin.
+/// Columns of the series `frame` that share a picture: file name, title, ordinate, logarithmic or not, the columns.
 const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
-    ("tension", "Largest tension", "tension", false, &["tension", "max_tension"]),
-    ("elongation", "Largest elongation of an element", "elongation", true, &["elongation", "max_elongation", "length_error"]),
-    (
-        "clearance",
-        "Closest gap: (distance - radii) / thread diameter",
-        "clearance",
-        false,
-        &["clearance", "thread_clearance", "shape_clearance", "min_clearance", "gap"],
-    ),
-    ("energy", "Mechanical energy", "energy", false, &["energy", "kinetic", "stretch", "bend", "twist"]),
-    ("ms_per_frame", "Solver time per frame", "time per frame", true, &["ms"]),
-    ("work", "Work of the solver per frame", "count", false, &["substeps", "rejected", "newton", "contacts"]),
+    ("tension", "Largest tension", "tension", false, &["max_tension"]),
+    ("elongation", "Largest elongation of an element", "|elongation|", true, &["max_elongation"]),
+    ("clearance", "Closest gap: (distance - radii) / thread diameter", "clearance", false, &["thread_clearance", "shape_clearance"]),
+    ("energy", "Mechanical energy", "energy", false, &["energy", "kinetic", "stretch", "bend", "twist", "gravity"]),
+    ("ms_per_frame", "Solver time of a frame", "time", true, &["ms"]),
+    ("work", "Work of the solver in a frame", "number", false, &["substeps", "rejected", "newton", "contacts"]),
 ];
 
 fn grouped(series: &Series) -> Vec<(String, Figure)> {
@@ -180,12 +174,11 @@ fn grouped(series: &Series) -> Vec<(String, Figure)> {
     };
     let mut out = Vec::new();
     if series.name == "frame" {
-        for (file, title, y_name, log, starts) in FRAME_PLOTS {
-            let columns = series.columns.iter().enumerate().skip(1).filter(|(_, (name, _))| starts.iter().any(|s| name.starts_with(s)));
-            let columns: Vec<_> = columns.collect();
-            let Some((_, (_, unit))) = columns.first() else { continue };
-            let lines = columns.iter().map(|(c, (name, _))| line(*c, &name.replace('_', " "))).collect();
-            out.push((file.to_string(), figure(title, (y_name, unit), log, lines)));
+        for (file, title, y_name, log, names) in FRAME_PLOTS {
+            let columns: Vec<usize> = names.iter().filter_map(|name| series.columns.iter().position(|c| c.0 == **name)).collect();
+            let Some(&first) = columns.first() else { continue };
+            let lines = columns.iter().map(|&c| line(c, &series.columns[c].0.replace('_', " "))).collect();
+            out.push((file.to_string(), figure(title, (y_name, &series.columns[first].1), log, lines)));
         }
         return out;
     }
@@ -234,18 +227,28 @@ fn geometry(outline: &ShapeOutline) -> Geometry {
 fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow::Result<()> {
     let trajectory = &outcome.trajectory;
     let (Some(first), Some(last)) = (trajectory.frames.first(), trajectory.frames.last()) else { return Ok(()) };
-    let chosen = [&args.stills[..], scene.stills()].into_iter().find(|t| !t.is_empty());
-    let times = chosen.map_or_else(|| vec![first.time, 0.5 * (first.time + last.time), last.time], <[f64]>::to_vec);
+    let of_phases: Vec<f64> = outcome.report.phases.iter().filter(|p| p.still).map(|p| p.end_s).collect();
+    let times = match (&args.stills[..], scene.stills(), &of_phases[..]) {
+        // A scene that names no times stands with the end alone.
+        ([], [] | [f64::INFINITY], []) => vec![first.time, 0.5 * (first.time + last.time), last.time],
+        ([], times, phases) => [times, phases].concat(),
+        (times, _, _) => times.to_vec(),
+    };
     let size = Size { width: args.picture_size.0, height: args.picture_size.1 };
-    let up = -DVec3::from(outcome.report.solver.gravity);
-    let up = up.try_normalize().unwrap_or(DVec3::Z);
+    let camera = scene.camera();
+    let up = camera.map_or_else(|| (-DVec3::from(outcome.report.solver.gravity)).try_normalize().unwrap_or(DVec3::Z), |c| c.up);
     // One direction for all pictures of a run, from which the last one shows its knot well.
     let at_end = subject(&trajectory.header, last);
-    let direction = args.look.map_or_else(|| still::best_direction(&at_end, &still::knot_region(&at_end.tubes), up), DVec3::from);
+    let chosen = args.look.map(DVec3::from).or(camera.map(|c| -c.from));
+    let direction = chosen.unwrap_or_else(|| {
+        let near = still::knot_region(&at_end.tubes);
+        let seen = if near.is_empty() { at_end.tubes.iter().flat_map(|t| t.points.iter().copied()).collect() } else { near };
+        still::best_direction(&at_end, &seen, up)
+    });
 
     let mut drawn: Vec<f64> = Vec::new();
     for time in times {
-        let Some(frame) = trajectory.nearest(time) else { continue };
+        let Some(frame) = trajectory.nearest(time.min(last.time)) else { continue };
         if drawn.contains(&frame.time) {
             continue;
         }
@@ -254,8 +257,12 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> a
         let radius = subject.tubes.iter().map(|t| t.radius).fold(0.0, f64::max);
         let all: Vec<DVec3> = subject.tubes.iter().flat_map(|t| t.points.iter().copied()).collect();
         let near = still::knot_region(&subject.tubes);
-        for (name, points, margin) in [("", &all, 4.0), ("-near", &near, 10.0)] {
-            let look = Look { direction: Some(direction), up: Some(up), ..Look::default() };
+        let whole = Look { direction: Some(direction), up: Some(up), ..Look::default() };
+        let chosen = Look { at: camera.and_then(|c| c.look_at), width: camera.and_then(|c| c.width), ..whole.clone() };
+        for (name, look, points, margin) in [("", chosen, &all, 4.0), ("-near", whole, &near, 10.0)] {
+            if points.is_empty() {
+                continue;
+            }
             let camera = Camera::fit(&look, points, margin * radius, size);
             let mut image = still::render(&subject, &camera, size);
             caption(&mut image, &format!("{}, {:.3} s", scene.title(), frame.time), camera.width())?;
@@ -280,7 +287,7 @@ fn summary(r: &Report) -> String {
     run.add_row(["least clearance [diameters]".to_string(), format!("thread-thread {}, thread-shape {}", gap(c.thread_thread), gap(c.thread_shape))]);
     run.add_row(["passes through".to_string(), truth(r.passes_through).to_string()]);
     run.add_row(["state hash".to_string(), r.state_hash.clone()]);
-    out.push_str(&format!("{run}\n"));
+    out.push_str(&format!("{run}\n\n"));
 
     let mut threads = table(&["thread", "elements", "length [mm]", "radius [mm]", "max elongation", "max tension [N]", "knot"], &[1, 2, 3, 4, 5]);
     for t in &r.threads {
@@ -291,12 +298,12 @@ fn summary(r: &Report) -> String {
             format!("{:.2}", 1e3 * t.length_m),
             format!("{:.4}", 1e3 * t.radius_m),
             format!("{:.2e}", t.max_elongation),
-            format!("{:.4}", t.max_tension_n),
+            short(t.max_tension_n),
             knot,
         ]);
     }
     if !r.threads.is_empty() {
-        out.push_str(&format!("{threads}\n"));
+        out.push_str(&format!("{threads}\n\n"));
     }
     let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
     for p in &r.phases {
@@ -304,23 +311,22 @@ fn summary(r: &Report) -> String {
         phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
     }
     if !r.phases.is_empty() {
-        out.push_str(&format!("{phases}\n"));
+        out.push_str(&format!("{phases}\n\n"));
     }
     let mut probes = table(&["probe", "unit", "first", "last", "least", "greatest"], &[2, 3, 4, 5]);
     for p in &r.probes {
-        let short = |v: f64| if v == 0.0 || (1e-3..1e5).contains(&v.abs()) { format!("{v:.5}") } else { format!("{v:.4e}") };
         probes.add_row([p.name.clone(), p.unit.clone(), short(p.first), short(p.last), short(p.min), short(p.max)]);
     }
     if !r.probes.is_empty() {
-        out.push_str(&format!("{probes}\n"));
+        out.push_str(&format!("{probes}\n\n"));
     }
-    let mut checks = table(&["check", "found", "unit", "wanted", ""], &[1]);
+    let mut checks = table(&["check", "found", "unit", "wanted", "result"], &[1]);
     for c in &r.checks {
         let found = c.value.as_ref().map_or_else(|| "never reached".into(), ToString::to_string);
         checks.add_row([c.name.clone(), found, c.unit.clone(), c.wanted.clone(), if c.passed { "passed" } else { "FAILED" }.into()]);
     }
     if !r.checks.is_empty() {
-        out.push_str(&format!("{checks}\n"));
+        out.push_str(&format!("{checks}\n\n"));
     }
     for i in &r.incidents {
         let last = if i.count > 1 { format!(" to {:.4} s, {} times", i.last_s, i.count) } else { String::new() };
@@ -339,6 +345,11 @@ fn summary(r: &Report) -> String {
     out.push_str(&verdict);
     out.push('\n');
     out
+}
+
+/// Five digits after the point, or an exponent where these would not do.
+fn short(v: f64) -> String {
+    if v == 0.0 || (1e-3..1e5).contains(&v.abs()) { format!("{v:.5}") } else { format!("{v:.3e}") }
 }
 
 #[cfg(test)]

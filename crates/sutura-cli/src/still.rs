@@ -1,6 +1,5 @@
 //! Still pictures of threads and shapes: rays cast at capsules, cylinders, boxes and triangles, with soft shadow and ambient
-//! occlusion, so that over and under at a crossing can be told. A picture is a function of its input alone: the random
-//! directions come from a hash of the pixel.
+//! occlusion, so that over and under at a crossing can be told. A picture is a function of its input alone.
 //!
 //! The thread is drawn as a tube about a smooth curve near its polyline, not as the polyline's capsules (see [`smooth`]).
 
@@ -68,8 +67,10 @@ pub const THREAD_COLORS: [[u8; 3]; 6] = [[38, 84, 160], [222, 128, 20], [0, 140,
 const SOLID_COLOR: [u8; 3] = [206, 202, 194];
 /// Cells of the 4 x 4 grid of a pixel in the order in which they are sampled: first four that share no row and no column.
 const SAMPLE_ORDER: [u32; 16] = [1, 7, 8, 14, 2, 4, 11, 13, 0, 6, 9, 15, 3, 5, 10, 12];
+/// Samples of a pixel that looks like its neighbors.
+const FEW: usize = 4;
 /// Ambient occlusion rays for each sample; a pixel averages 4 or 16 times as many.
-const OCCLUSION_RAYS: u32 = 3;
+const OCCLUSION_RAYS: u32 = 2;
 /// Half the opening angle of the perspective, as a tangent: narrow, so that a thread's thickness hardly depends on its depth.
 const HALF_FIELD: f64 = 0.2;
 
@@ -166,10 +167,11 @@ impl Image {
     }
 }
 
-/// Points every `length / parts` of a smooth curve near the polyline `x`: a quadratic B-spline whose control points are moved out by
-/// a sixteenth of the second difference, so that it leaves the polyline by no more than a sixteenth of it, outward at the middles
-/// of the elements and inward at the joints alike.
-pub fn smooth(x: &[DVec3], parts: usize) -> Vec<DVec3> {
+/// Points of a smooth curve near the polyline `x`: a quadratic B-spline whose control points are moved out by a sixteenth of the
+/// second difference, so that it leaves the polyline by no more than a sixteenth of it, outward at the middles of the elements and
+/// inward at the joints alike. Neighboring pieces turn by at most 0.08 rad, which an outline hardly shows, and
+/// shading turns smoothly from one to the next (see [`Capsule`]).
+pub fn smooth(x: &[DVec3]) -> Vec<DVec3> {
     let n = x.len();
     if n < 3 {
         return x.to_vec();
@@ -179,6 +181,7 @@ pub fn smooth(x: &[DVec3], parts: usize) -> Vec<DVec3> {
     for i in 1..n - 1 {
         let (a, b, c) = (control(i - 1), control(i), control(i + 1));
         let (from, to) = (if i == 1 { a } else { (a + b) * 0.5 }, if i == n - 2 { c } else { (b + c) * 0.5 });
+        let parts = ((b - a).angle_between(c - b) / 0.08).ceil().clamp(1.0, 16.0) as usize;
         for k in 1..=parts {
             let s = k as f64 / parts as f64;
             out.push(from * ((1.0 - s) * (1.0 - s)) + b * (2.0 * s * (1.0 - s)) + to * (s * s));
@@ -189,10 +192,32 @@ pub fn smooth(x: &[DVec3], parts: usize) -> Vec<DVec3> {
 
 /// One thing that a ray can hit.
 enum Primitive {
-    Capsule { a: DVec3, b: DVec3, radius: f64 },
+    Capsule(Capsule),
     Cylinder { pose: Pose, radius: f64, half_length: f64 },
     Box { pose: Pose, half_sides: DVec3 },
     Triangle([DVec3; 3]),
+}
+
+/// Points within `radius` of a piece of a line; `axis` is a unit vector, or zero for a ball.
+struct Capsule {
+    start: DVec3,
+    axis: DVec3,
+    length: f64,
+    radius: f64,
+    /// Tangents of a curve of which this is a piece, at its two ends: its normals are across them. Zero at an end of the curve.
+    tangents: [DVec3; 2],
+}
+
+impl Capsule {
+    fn new(start: DVec3, end: DVec3, radius: f64) -> Capsule {
+        Capsule { start, axis: (end - start).normalize_or_zero(), length: (end - start).length(), radius, tangents: [DVec3::ZERO; 2] }
+    }
+
+    /// The pieces of a curve.
+    fn chain(points: &[DVec3], radius: f64) -> impl Iterator<Item = Capsule> + '_ {
+        let tangent = move |i: usize| if i == 0 || i + 1 == points.len() { DVec3::ZERO } else { (points[i + 1] - points[i - 1]).normalize_or_zero() };
+        (1..points.len()).map(move |i| Capsule { tangents: [tangent(i - 1), tangent(i)], ..Capsule::new(points[i - 1], points[i], radius) })
+    }
 }
 
 struct Hit {
@@ -208,7 +233,10 @@ impl Primitive {
             Bounds { low: pose.position - half, high: pose.position + half }
         };
         match self {
-            Primitive::Capsule { a, b, radius } => Bounds { low: a.min(*b) - *radius, high: a.max(*b) + *radius },
+            Primitive::Capsule(c) => {
+                let end = c.start + c.axis * c.length;
+                Bounds { low: c.start.min(end) - c.radius, high: c.start.max(end) + c.radius }
+            }
             Primitive::Cylinder { pose, radius, half_length } => around(pose, DVec3::new(*radius, *radius, *half_length)),
             Primitive::Box { pose, half_sides } => around(pose, *half_sides),
             Primitive::Triangle([a, b, c]) => Bounds { low: a.min(*b).min(*c), high: a.max(*b).max(*c) },
@@ -218,7 +246,7 @@ impl Primitive {
     /// First hit from outside at 0 < t < `far`.
     fn hit(&self, ray: &Ray, far: f64) -> Option<Hit> {
         match self {
-            Primitive::Capsule { a, b, radius } => hit_capsule(ray, *a, *b, *radius, far),
+            Primitive::Capsule(c) => hit_capsule(ray, c, far),
             Primitive::Cylinder { pose, radius, half_length } => in_frame(pose, ray, |r| hit_cylinder(r, *radius, *half_length, far)),
             Primitive::Box { pose, half_sides } => in_frame(pose, ray, |r| hit_box(r, *half_sides, far)),
             Primitive::Triangle(corners) => hit_triangle(ray, corners, far),
@@ -239,29 +267,28 @@ fn entry(o: DVec3, d: DVec3, u: DVec3, radius: f64) -> Option<f64> {
     (discriminant > 0.0 && a > 0.0).then(|| (-b - discriminant.sqrt()) / a)
 }
 
-fn hit_capsule(ray: &Ray, a: DVec3, b: DVec3, radius: f64, far: f64) -> Option<Hit> {
-    // From the point of the ray nearest to `a`: at a metre's distance the roots of a tenth of a millimetre lose digits.
-    let shift = (a - ray.origin).dot(ray.direction);
-    let o = ray.origin + ray.direction * shift - a;
-    let length = (b - a).length();
-    let u = if length > 0.0 { (b - a) / length } else { DVec3::ZERO };
-    let mut best = f64::INFINITY;
-    let mut center = DVec3::ZERO;
-    if let Some(t) = entry(o, ray.direction, u, radius) {
-        let along = (o + ray.direction * t).dot(u);
-        if (0.0..=length).contains(&along) {
-            (best, center) = (t, u * along);
+fn hit_capsule(ray: &Ray, c: &Capsule, far: f64) -> Option<Hit> {
+    // From the point of the ray nearest to the start: at a meter's distance the roots of a tenth of a millimeter lose digits.
+    let shift = (c.start - ray.origin).dot(ray.direction);
+    let o = ray.origin + ray.direction * shift - c.start;
+    let t = entry(o, ray.direction, c.axis, c.radius);
+    let along = t.map(|t| (o + ray.direction * t).dot(c.axis));
+    let (t, center) = match (t, along) {
+        (Some(t), Some(along)) if (0.0..=c.length).contains(&along) => (t, c.axis * along),
+        // Both balls are inside the endless cylinder: a ray that misses it misses them, unless it runs along it.
+        (None, _) if ray.direction.dot(c.axis).abs() < 0.999_999 => return None,
+        _ => {
+            let (start, end) = (DVec3::ZERO, c.axis * c.length);
+            let ball = |center: DVec3| entry(o - center, ray.direction, DVec3::ZERO, c.radius).map(|t| (t, center));
+            [ball(start), ball(end)].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0))?
         }
-    }
-    for end in [DVec3::ZERO, u * length] {
-        if let Some(t) = entry(o - end, ray.direction, DVec3::ZERO, radius)
-            && t < best
-        {
-            (best, center) = (t, end);
-        }
-    }
-    let t = best + shift;
-    (t > 0.0 && t < far).then(|| Hit { t, normal: (o + ray.direction * best - center) / radius })
+    };
+    (t + shift > 0.0 && t + shift < far).then(|| {
+        let normal = (o + ray.direction * t - center) / c.radius;
+        let place = if c.length > 0.0 { center.length() / c.length } else { 0.0 };
+        let tangent = c.tangents[0].lerp(c.tangents[1], place);
+        Hit { t: t + shift, normal: (normal - tangent * normal.dot(tangent)).normalize() }
+    })
 }
 
 fn hit_cylinder(ray: &Ray, radius: f64, half_length: f64, far: f64) -> Option<Hit> {
@@ -319,8 +346,10 @@ impl Bounds {
     }
 }
 
-/// A tree of bounding boxes over the primitives, halved at the median of the longest side.
+/// A tree of bounding boxes over the primitives, halved at the median of the longest side. Solids larger than a few pieces of thread
+/// would make every box large; they stand beside the tree.
 struct Tree {
+    large: Vec<(Primitive, Color)>,
     nodes: Vec<Node>,
     primitives: Vec<(Primitive, Color)>,
 }
@@ -338,13 +367,15 @@ enum NodeKind {
 }
 
 impl Tree {
-    fn build(mut primitives: Vec<(Primitive, Color)>) -> Tree {
+    fn build(primitives: Vec<(Primitive, Color)>) -> Tree {
+        let is_large = |p: &(Primitive, Color)| !matches!(p.0, Primitive::Capsule(_) | Primitive::Triangle(_));
+        let (large, mut primitives): (Vec<_>, Vec<_>) = primitives.into_iter().partition(is_large);
         let mut nodes = Vec::new();
         let n = primitives.len();
         if n > 0 {
             Self::split(&mut nodes, &mut primitives, 0, n);
         }
-        Tree { nodes, primitives }
+        Tree { large, nodes, primitives }
     }
 
     fn split(nodes: &mut Vec<Node>, primitives: &mut [(Primitive, Color)], from: usize, to: usize) {
@@ -371,38 +402,60 @@ impl Tree {
 
     /// The nearest hit before `far`, or with `any` the first that is found.
     fn hit(&self, ray: &Ray, far: f64, any: bool) -> Option<(Hit, Color)> {
-        let inverse = ray.direction.recip();
         let mut best: Option<(Hit, Color)> = None;
         let mut far = far;
-        let mut stack = [0_usize; 64];
-        let mut height = usize::from(!self.nodes.is_empty());
-        while height > 0 {
-            height -= 1;
-            let index = stack[height];
-            let node = &self.nodes[index];
-            if node.bounds.enter(ray.origin, inverse, far).is_none() {
-                continue;
-            }
-            match node.kind {
-                NodeKind::Fork(second) => {
-                    stack[height] = second;
-                    stack[height + 1] = index + 1;
-                    height += 2;
-                }
-                NodeKind::Leaf(from, to) => {
-                    for (primitive, color) in &self.primitives[from..to] {
-                        if let Some(hit) = primitive.hit(ray, far) {
-                            far = hit.t;
-                            best = Some((hit, *color));
-                            if any {
-                                return best;
-                            }
-                        }
+        // Whether the search is over.
+        let mut test = |primitives: &[(Primitive, Color)], far: &mut f64| {
+            for (primitive, color) in primitives {
+                if let Some(hit) = primitive.hit(ray, *far) {
+                    *far = hit.t;
+                    best = Some((hit, *color));
+                    if any {
+                        return true;
                     }
                 }
             }
+            false
+        };
+        if test(&self.large, &mut far) || self.nodes.is_empty() {
+            return best;
         }
-        best
+        let inverse = ray.direction.recip();
+        let enter = |index: usize, far: f64| self.nodes[index].bounds.enter(ray.origin, inverse, far).map(|near| (near, index));
+        // A tree halved at the median is no deeper than the logarithm of its size.
+        let mut stack = [(0.0, 0_usize); 64];
+        let mut height = 0;
+        let mut next = enter(0, far);
+        loop {
+            let Some((near, index)) = next else {
+                if height == 0 {
+                    return best;
+                }
+                height -= 1;
+                next = Some(stack[height]);
+                continue;
+            };
+            next = None;
+            if near >= far {
+                continue;
+            }
+            match self.nodes[index].kind {
+                NodeKind::Leaf(from, to) => {
+                    if test(&self.primitives[from..to], &mut far) {
+                        return best;
+                    }
+                }
+                NodeKind::Fork(second) => match (enter(index + 1, far), enter(second, far)) {
+                    (Some(a), Some(b)) => {
+                        let (nearer, farther) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+                        stack[height] = farther;
+                        height += 1;
+                        next = Some(nearer);
+                    }
+                    (a, b) => next = a.or(b),
+                },
+            }
+        }
     }
 }
 
@@ -423,19 +476,18 @@ impl Stage {
         let mut floors = Vec::new();
         for (i, tube) in subject.tubes.iter().enumerate() {
             let color = linear(THREAD_COLORS[i % THREAD_COLORS.len()]);
-            for pair in smooth(&tube.points, 4).windows(2) {
-                primitives.push((Primitive::Capsule { a: pair[0], b: pair[1], radius: tube.radius }, color));
-            }
+            let curve = smooth(&tube.points);
+            primitives.extend(Capsule::chain(&curve, tube.radius).map(|c| (Primitive::Capsule(c), color)));
         }
         for solid in &subject.solids {
             let color = linear(SOLID_COLOR);
             let pose = solid.pose;
             match &solid.geometry {
                 Geometry::Plane => floors.push(Floor { point: pose.position, normal: pose.orientation * DVec3::Z }),
-                Geometry::Sphere { radius } => primitives.push((Primitive::Capsule { a: pose.position, b: pose.position, radius: *radius }, color)),
+                Geometry::Sphere { radius } => primitives.push((Primitive::Capsule(Capsule::new(pose.position, pose.position, *radius)), color)),
                 Geometry::Capsule { radius, half_length } => {
                     let (a, b) = (pose.transform_point(DVec3::Z * *half_length), pose.transform_point(DVec3::Z * -half_length));
-                    primitives.push((Primitive::Capsule { a, b, radius: *radius }, color));
+                    primitives.push((Primitive::Capsule(Capsule::new(a, b, *radius)), color));
                 }
                 Geometry::Cylinder { radius, half_length } => {
                     primitives.push((Primitive::Cylinder { pose, radius: *radius, half_length: *half_length }, color));
@@ -490,46 +542,68 @@ pub fn best_direction(subject: &Subject, points: &[DVec3], up: DVec3) -> DVec3 {
     best.1
 }
 
-/// Draws the subject.
+/// Draws the subject: a few samples in each pixel, then more where neighbors differ.
 pub fn render(subject: &Subject, camera: &Camera, size: Size) -> Image {
-    let stage = Stage::new(subject);
-    let row_length = size.width as usize * 3;
-    let mut rgb = vec![0_u8; row_length * size.height as usize];
-    let rows = Mutex::new(rgb.chunks_mut(row_length).enumerate());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                loop {
-                    let next = rows.lock().expect("no worker panics while it holds the rows").next();
-                    let Some((y, row)) = next else { break };
-                    for (x, pixel) in row.chunks_mut(3).enumerate() {
-                        pixel.copy_from_slice(&encode(draw_pixel(&stage, camera, size, x as u32, y as u32)));
-                    }
-                }
-            });
+    let painter = Painter { stage: Stage::new(subject), camera, size };
+    let (columns, rows) = (size.width as usize, size.height as usize);
+    let coarse = painter.each_pixel(|x, y| painter.sum(x, y, 0..FEW) / FEW as f64);
+    let differs = |x: usize, y: usize| {
+        let (mut low, mut high) = (Color::INFINITY, Color::NEG_INFINITY);
+        for v in y.saturating_sub(1)..(y + 2).min(rows) {
+            for color in &coarse[v * columns + x.saturating_sub(1)..v * columns + (x + 2).min(columns)] {
+                let seen = color.map(|c| c.max(0.0).sqrt());
+                (low, high) = (low.min(seen), high.max(seen));
+            }
         }
+        (high - low).max_element() > 0.02
+    };
+    let all = SAMPLE_ORDER.len();
+    let fine = painter.each_pixel(|x, y| {
+        let few = coarse[y * columns + x];
+        if differs(x, y) { (few * FEW as f64 + painter.sum(x, y, FEW..all)) / all as f64 } else { few }
     });
-    Image { size, rgb }
+    Image { size, rgb: fine.into_iter().flat_map(encode).collect() }
 }
 
-fn draw_pixel(stage: &Stage, camera: &Camera, size: Size, x: u32, y: u32) -> Color {
-    let mut dice = Dice::new(u64::from(y) << 32 | u64::from(x));
-    let (mut sum, mut count) = (Color::ZERO, 0.0);
-    let (mut low, mut high) = (Color::INFINITY, Color::NEG_INFINITY);
-    for k in SAMPLE_ORDER {
-        let u = 2.0 * (f64::from(x) + (f64::from(k % 4) + 0.5) / 4.0) / f64::from(size.width) - 1.0;
-        let v = 1.0 - 2.0 * (f64::from(y) + (f64::from(k / 4) + 0.5) / 4.0) / f64::from(size.height);
-        let color = look_along(stage, camera, &camera.ray(u, v), v, &mut dice);
-        (sum, count) = (sum + color, count + 1.0);
-        let seen = color.map(|c| c.max(0.0).sqrt());
-        (low, high) = (low.min(seen), high.max(seen));
-        // Four samples alike to the eye need no others.
-        if count == 4.0 && (high - low).max_element() < 0.015 {
-            break;
-        }
+struct Painter<'a> {
+    stage: Stage,
+    camera: &'a Camera,
+    size: Size,
+}
+
+impl Painter<'_> {
+    /// The value of `paint` at each pixel, row by row, on all cores.
+    fn each_pixel(&self, paint: impl Fn(usize, usize) -> Color + Sync) -> Vec<Color> {
+        let columns = self.size.width as usize;
+        let mut colors = vec![Color::ZERO; columns * self.size.height as usize];
+        let rows = Mutex::new(colors.chunks_mut(columns).enumerate());
+        let workers = std::thread::available_parallelism().map_or(1, usize::from);
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(|| {
+                    loop {
+                        let next = rows.lock().expect("no worker panics while it holds the rows").next();
+                        let Some((y, row)) = next else { break };
+                        for (x, color) in row.iter_mut().enumerate() {
+                            *color = paint(x, y);
+                        }
+                    }
+                });
+            }
+        });
+        colors
     }
-    sum / count
+
+    /// Sum over some of the samples of a pixel.
+    fn sum(&self, x: usize, y: usize, samples: core::ops::Range<usize>) -> Color {
+        let mut dice = Dice::new(samples.start);
+        let place = |at: usize, cell: u32, count: u32| 2.0 * (at as f64 + (f64::from(cell) + 0.5) / 4.0) / f64::from(count) - 1.0;
+        let one = |k: u32| {
+            let (u, v) = (place(x, k % 4, self.size.width), -place(y, k / 4, self.size.height));
+            look_along(&self.stage, self.camera, &self.camera.ray(u, v), v, &mut dice)
+        };
+        SAMPLE_ORDER[samples].iter().copied().map(one).sum()
+    }
 }
 
 /// Light that comes along a ray.
@@ -569,7 +643,7 @@ fn look_along(stage: &Stage, camera: &Camera, ray: &Ray, screen_y: f64, dice: &m
     let color = albedo * ((ambient + diffuse) * rim) + shine * rim;
     // What lies deeper than the middle fades a little into the background.
     let depth = ((p - camera.at).dot(camera.forward) / (2.0 * camera.half_width)).clamp(0.0, 1.0);
-    color.lerp(background, 0.3 * depth)
+    color.lerp(background, 0.2 * depth)
 }
 
 /// How much of the light from the key lamp arrives (0 or 1, softened by the average over a pixel), and from where.
@@ -577,7 +651,7 @@ fn light(stage: &Stage, camera: &Camera, p: DVec3, normal: DVec3, dice: &mut Dic
     let lamp = (camera.up * 0.85 - camera.right * 0.45 - camera.forward * 0.75).normalize();
     let (a, b) = dice.pair();
     let across = lamp.any_orthonormal_vector();
-    let (radius, turn) = (0.09 * a.sqrt(), TAU * b);
+    let (radius, turn) = (0.045 * a.sqrt(), TAU * b);
     let direction = (lamp + (across * turn.cos() + lamp.cross(across) * turn.sin()) * radius).normalize();
     if normal.dot(direction) <= 0.0 {
         return (0.0, lamp);
@@ -601,28 +675,26 @@ fn openness(stage: &Stage, p: DVec3, normal: DVec3, reach: f64, dice: &mut Dice)
     open / f64::from(OCCLUSION_RAYS)
 }
 
-/// Evenly spread pairs in the unit square: the sequence of the plastic number (Roberts 2018), begun at a place that is hashed from
-/// the pixel (splitmix64, Steele et al. 2014).
+/// Evenly spread pairs in the unit square: the sequence of the plastic number (Roberts 2018). Every pixel uses the same ones, so that
+/// what is smooth looks smooth and not grainy.
 struct Dice {
     at: (f64, f64),
 }
 
 impl Dice {
-    fn new(seed: u64) -> Dice {
-        let hash = |seed: u64| {
-            let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            (z ^ (z >> 31)) >> 11
-        };
-        let unit = (1_u64 << 53) as f64;
-        Dice { at: (hash(seed) as f64 / unit, hash(!seed) as f64 / unit) }
+    /// The sequence from the first pair of a sample on.
+    fn new(sample: usize) -> Dice {
+        let skipped = (sample * (1 + OCCLUSION_RAYS as usize)) as f64;
+        Dice { at: ((0.5 + skipped * PLASTIC.0).fract(), (0.5 + skipped * PLASTIC.1).fract()) }
     }
     fn pair(&mut self) -> (f64, f64) {
-        self.at = ((self.at.0 + 0.754_877_666_246_692_8).fract(), (self.at.1 + 0.569_840_290_998_053_3).fract());
+        self.at = ((self.at.0 + PLASTIC.0).fract(), (self.at.1 + PLASTIC.1).fract());
         self.at
     }
 }
+
+/// One over the plastic number, and one over its square.
+const PLASTIC: (f64, f64) = (0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
 fn smoothstep(x: f64) -> f64 {
     let x = x.clamp(0.0, 1.0);
@@ -640,7 +712,7 @@ fn encode(c: Color) -> [u8; 3] {
 }
 
 /// The part of the threads worth a closer look: points where thread lies near other thread (or near itself, `pi` radii along it
-/// left out); where there is none, around the sharpest bend.
+/// left out); where there is none, around the sharpest bend; nothing when the threads are nearly straight.
 pub fn knot_region(tubes: &[Tube]) -> Vec<DVec3> {
     let all: Vec<(usize, f64, DVec3, f64)> = tubes
         .iter()
@@ -669,11 +741,10 @@ pub fn knot_region(tubes: &[Tube]) -> Vec<DVec3> {
         points = near(4.0);
     }
     if points.len() < 4 {
-        let sharpest = tubes
-            .iter()
-            .flat_map(|t| t.points.windows(3).map(move |w| ((w[0] - w[1] * 2.0 + w[2]).length() / (w[2] - w[0]).length_squared().max(1e-30), w[1], t.radius)))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, p, r)) = sharpest {
+        let bend = |w: &[DVec3]| (w[0] - w[1] * 2.0 + w[2]).length() * 4.0 / (w[2] - w[0]).length_squared();
+        let bends = tubes.iter().flat_map(|t| t.points.windows(3).map(move |w| (bend(w) * t.radius, w[1], t.radius)));
+        // Bends of more than fifty radii are no sight.
+        if let Some((_, p, r)) = bends.filter(|b| b.0 > 0.02).max_by(|a, b| a.0.total_cmp(&b.0)) {
             points = all.iter().filter(|a| (a.2 - p).length() < 30.0 * r).map(|a| a.2).collect();
         }
     }

@@ -1,0 +1,226 @@
+//! The program as a user meets it: what it prints, what it writes, and with which code it ends.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Runs the program in a folder.
+fn sutura(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sutura")).args(args).current_dir(folder).output().expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).expect("the program prints UTF-8")
+}
+
+fn polyline(name: &str) -> String {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../sutura/tests/polylines").join(format!("{name}.csv"));
+    path.to_str().expect("a path of text").to_string()
+}
+
+/// A pinned thread that swings for a tenth of a second over a post; `LIMIT` is to be replaced by what its tip may fall.
+const SWING: &str = r#"
+title = "Swing"
+
+[[thread]]
+name = "thread"
+diameter = "0.2 mm"
+young_modulus = "1 GPa"
+poisson_ratio = 0.4
+density = "1150 kg/m^3"
+elements = 20
+line = { from = [0, 0, 0], to = "[30, 0, 0] mm" }
+
+[[grip]]
+name = "nail"
+at = "start"
+hold = "pin"
+
+[[phase]]
+name = "fall"
+duration = "0.1 s"
+
+[[probe]]
+name = "tip"
+what = "position(thread.end)"
+unit = "mm"
+
+[[check]]
+name = "falls"
+that = "-position(thread.end).z"
+at_least = "LIMIT"
+"#;
+
+fn write_swing(folder: &Path, limit: &str) {
+    std::fs::write(folder.join("swing.toml"), SWING.replace("LIMIT", limit)).expect("a temporary folder can be written");
+}
+
+fn is_png(path: &Path, width: u32, height: u32) -> bool {
+    let bytes = std::fs::read(path).unwrap_or_default();
+    let number = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_be_bytes([b[0], b[1], b[2], b[3]]));
+    bytes.starts_with(b"\x89PNG\r\n\x1a\n") && number(16) == Some(width) && number(20) == Some(height)
+}
+
+#[test]
+fn help_teaches() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = sutura(folder.path(), &["--help"]);
+    assert_eq!(out.status.code(), Some(0));
+    let help = text(&out.stdout);
+    for word in ["run", "scenes", "knot", "presets", "bench", "Examples:", "Exit codes"] {
+        assert!(help.contains(word), "`{word}` is in the help");
+    }
+    for command in ["run", "scenes", "knot", "presets", "bench"] {
+        let out = sutura(folder.path(), &[command, "--help"]);
+        assert_eq!(out.status.code(), Some(0), "{command}");
+        assert!(text(&out.stdout).contains("Examples:"), "{command} --help has examples");
+    }
+}
+
+#[test]
+fn bad_input_ends_with_two_and_says_why() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("bad.toml"), SWING.replace("elements", "elemnts")).unwrap();
+    std::fs::write(folder.path().join("bad.csv"), "x,y,z\n0,0,0\n1,0,0\n1,fish,0\n").unwrap();
+    // Line 10 of the scene is the misspelled key; line 4 of the table is the one with the fish.
+    let cases: [(&[&str], &[&str]); 8] = [
+        (&["run", "bad.toml"], &["bad.toml:10", "elemnts", "elements"]),
+        (&["run", "nowhere/none.toml"], &["nowhere/none.toml"]),
+        (&["run", "capstn"], &["capstn", "capstan"]),
+        (&["run", "bad.toml", "--picture-size", "7"], &["1200x900"]),
+        (&["knot", "bad.csv"], &["bad.csv:4", "fish"]),
+        (&["knot", "none.csv"], &["none.csv"]),
+        (&["knot", "bad.csv", "--expect", "sqare"], &["sqare", "square"]),
+        (&["scenes", "show", "capstn"], &["capstan"]),
+    ];
+    for (args, words) in cases {
+        let out = sutura(folder.path(), args);
+        let error = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(2), "{args:?}: {error}");
+        for word in words {
+            assert!(error.contains(word), "{args:?} names `{word}`: {error}");
+        }
+        assert!(!error.contains("panicked"), "{args:?}: {error}");
+    }
+    assert!(!folder.path().join("out").exists(), "a scene that cannot be read leaves nothing behind");
+}
+
+#[test]
+fn a_run_writes_everything_and_what_it_writes_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let out = sutura(folder.path(), &["run", "swing.toml", "--picture-size", "96x72", "--still", "0.05"]);
+    assert_eq!(out.status.code(), Some(0), "{}{}", text(&out.stdout), text(&out.stderr));
+    let printed = text(&out.stdout);
+    for word in ["Swing", "real-time factor", "falls", "All 1 checks passed", "tip.z"] {
+        assert!(printed.contains(word), "`{word}` is printed: {printed}");
+    }
+    let results = folder.path().join("out/swing");
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(results.join("report.json")).unwrap()).unwrap();
+    let keys = ["scene", "solver", "simulated_s", "cpu_s", "real_time_factor", "ms_per_frame", "threads", "min_clearance", "passes_through"];
+    for key in keys.iter().chain(&["probes", "checks", "incidents", "state_hash"]) {
+        assert!(report.get(key).is_some(), "report.json has `{key}`");
+    }
+    // Frames are a sixtieth of a second, so the run ends within one of its tenth of a second.
+    assert!((report["simulated_s"].as_f64().unwrap() - 0.1).abs() < 1.0 / 60.0);
+    assert_eq!(report["checks"][0]["passed"], true);
+    for file in ["series/frame.csv", "series/tip.csv", "plots/tension.svg", "plots/elongation.svg", "plots/energy.svg", "plots/ms_per_frame.svg"] {
+        let content = std::fs::read_to_string(results.join(file)).unwrap_or_default();
+        assert!(content.len() > 100, "{file} is there and not empty");
+    }
+    for plot in ["tension", "elongation", "energy", "ms_per_frame", "probe-tip"] {
+        assert!(is_png(&results.join(format!("plots/{plot}.png")), 1720, 880), "{plot}.png is a picture of the size drawn");
+    }
+    assert!(is_png(&results.join("stills/000.0500s.png"), 96, 72), "the still asked for is there");
+    let trajectory = sutura_scene::Trajectory::read_from(&results.join("trajectory.sutura")).unwrap();
+    assert_eq!((trajectory.header.threads.len(), trajectory.header.threads[0].elements), (1, 20));
+
+    // A straight thread that swings is no knot, from the recording as well.
+    let out = sutura(folder.path(), &["knot", "out/swing/trajectory.sutura", "--expect", "unknot", "--frame", "-1"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stdout));
+
+    // What an earlier run left must not pass for results of a later one.
+    let out = sutura(folder.path(), &["run", "swing.toml", "--no-plots", "--no-stills", "--quiet"]);
+    assert_eq!((out.status.code(), text(&out.stdout)), (Some(0), String::new()));
+    assert!(!results.join("plots/tension.png").exists() && !results.join("stills/000.0500s.png").exists());
+}
+
+#[test]
+fn a_check_that_fails_ends_with_one() {
+    let folder = tempfile::tempdir().unwrap();
+    // In a tenth of a second nothing falls farther than g t^2 / 2 = 49 mm, and the thread is 30 mm long.
+    write_swing(folder.path(), "50 mm");
+    let out = sutura(folder.path(), &["run", "swing.toml", "--dry"]);
+    assert_eq!(out.status.code(), Some(1), "{}", text(&out.stderr));
+    assert!(text(&out.stdout).contains("FAILED: 1 of 1 checks"));
+    assert!(!folder.path().join("out").exists(), "--dry writes nothing");
+}
+
+#[test]
+fn knots_of_the_reference_polylines() {
+    let folder = tempfile::tempdir().unwrap();
+    // Determinant and signature from the tables of knots: connected sums multiply the one and add the other.
+    let cases = [
+        ("throw_+1_unknot", "unknot", 1, 0),
+        ("trefoil_R", "trefoil-right", 3, -2),
+        ("trefoil_L", "trefoil-left", 3, 2),
+        ("figure8", "figure-eight", 5, 0),
+        ("square_+3-3", "square", 9, 0),
+        ("granny_+3+3", "granny-right", 9, -4),
+        ("surgeon_square_+5-3", "surgeon-square-right", 15, -2),
+    ];
+    for (file, name, determinant, signature) in cases {
+        for join in [&["--closed"][..], &["--ends", "free"]] {
+            let path = polyline(file);
+            let args = [&["knot", path.as_str(), "--json", "--expect", name], join].concat();
+            let out = sutura(folder.path(), &args);
+            let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+            assert_eq!((answer["knot"].as_str(), out.status.code()), (Some(name), Some(0)), "{file} {join:?}");
+            assert_eq!((answer["determinant"].as_u64(), answer["signature"].as_i64()), (Some(determinant), Some(signature)), "{file} {join:?}");
+        }
+    }
+    let out = sutura(folder.path(), &["knot", &polyline("granny_+3+3"), "--expect", "square"]);
+    assert_eq!(out.status.code(), Some(1), "a granny is not a square knot");
+    assert!(text(&out.stdout).contains("determinant 9"));
+}
+
+#[test]
+fn scenes_are_listed_shown_and_copied_but_not_over_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = text(&sutura(folder.path(), &["scenes"]).stdout);
+    for sample in sutura_scene::samples() {
+        assert!(list.contains(sample.name), "{} is listed", sample.name);
+    }
+    let sample = &sutura_scene::samples()[0];
+    assert_eq!(text(&sutura(folder.path(), &["scenes", "show", sample.name]).stdout).trim_end(), sample.text.trim_end());
+    assert_eq!(sutura(folder.path(), &["scenes", "copy", sample.name]).status.code(), Some(0));
+    let file = folder.path().join(format!("{}.toml", sample.name));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), sample.text);
+    std::fs::write(&file, "mine").unwrap();
+    assert_eq!(sutura(folder.path(), &["scenes", "copy", sample.name]).status.code(), Some(2));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine", "a file that exists is kept");
+}
+
+#[test]
+fn presets_say_what_is_unverified() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(&sutura(folder.path(), &["presets"]).stdout);
+    assert!(out.contains("3-0") && out.contains("silk") && out.contains("* unverified") && out.contains("Sources"));
+    let json: serde_json::Value = serde_json::from_slice(&sutura(folder.path(), &["presets", "--json"]).stdout).unwrap();
+    let silk = json["materials"].as_array().unwrap().iter().find(|m| m["name"] == "silk").expect("silk is a preset");
+    // Naleway 2015 measured the modulus; no one measured the bending scale.
+    assert_eq!(silk["figures"]["young_modulus"]["verified"], true);
+    assert_eq!(silk["figures"]["bend_scale"]["verified"], false);
+}
+
+#[test]
+fn bench_measures_and_names_the_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = sutura(folder.path(), &["bench", "--free", "--elements", "10", "--frames", "5", "--shape", "straight", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(json["machine"]["cores"].as_u64() >= Some(1) && json["machine"]["build"].is_string());
+    let row = &json["free_thread"][0];
+    assert!(row["ms_median"].as_f64() > Some(0.0) && row["ms_p99"].as_f64() >= row["ms_median"].as_f64());
+    // Inextensible means to a thousandth of a percent.
+    assert!(row["max_elongation"].as_f64() < Some(1e-5));
+}

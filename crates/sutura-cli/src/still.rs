@@ -323,7 +323,7 @@ fn hit_triangle(ray: &Ray, [a, b, c]: &[DVec3; 3], far: f64) -> Option<Hit> {
     let facing = -ray.direction.dot(n);
     let t = o.dot(n) / facing;
     let q = o.cross(ray.direction);
-    let (u, v) = (-e2.dot(q) / facing, e1.dot(q) / facing);
+    let (u, v) = (e2.dot(q) / facing, -e1.dot(q) / facing);
     // Both sides are seen; the normal is turned to the ray.
     (t > 0.0 && t < far && u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| Hit { t, normal: n.normalize() * facing.signum() })
 }
@@ -753,4 +753,156 @@ pub fn knot_region(tubes: &[Tube]) -> Vec<DVec3> {
     points.sort_by(|a, b| (*a - middle).length().total_cmp(&(*b - middle).length()));
     points.truncate((points.len() * 9).div_ceil(10));
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size { width: 48, height: 48 };
+
+    /// Two threads that cross at the origin, the first along x at height `z` over the second along y.
+    fn crossing(z: f64) -> Subject {
+        let tube = |along: DVec3, at: DVec3| Tube { points: (-4..=4).map(|i| along * (f64::from(i) * 1e-3) + at).collect(), radius: 3e-4 };
+        Subject { tubes: vec![tube(DVec3::X, DVec3::Z * z), tube(DVec3::Y, DVec3::ZERO)], solids: Vec::new() }
+    }
+
+    fn from_above(subject: &Subject, orthographic: bool) -> Image {
+        let look = Look { direction: Some(-DVec3::Z), up: Some(DVec3::Y), at: Some(DVec3::ZERO), width: Some(4e-3), orthographic };
+        render(subject, &Camera::fit(&look, &[], 1e-4, SIZE), SIZE)
+    }
+
+    /// Blue less red at a pixel: positive on the first thread's color, negative on the second's.
+    fn blueness(image: &Image, x: u32, y: u32) -> i32 {
+        let at = (3 * (y * image.size.width + x)) as usize;
+        i32::from(image.rgb[at + 2]) - i32::from(image.rgb[at])
+    }
+
+    #[test]
+    fn the_upper_thread_covers_the_lower_one() {
+        for orthographic in [false, true] {
+            let (over, under) = (from_above(&crossing(7e-4), orthographic), from_above(&crossing(-7e-4), orthographic));
+            // The colors differ by over 100 of 255; shading and fading take less than half of that.
+            assert!(blueness(&over, 24, 24) > 40, "the first thread is over: {}", blueness(&over, 24, 24));
+            assert!(blueness(&under, 24, 24) < -40, "the first thread is under: {}", blueness(&under, 24, 24));
+            // Beside the crossing each is seen: x runs to the right, y upward.
+            assert!(blueness(&over, 44, 24) > 40 && blueness(&over, 24, 4) < -40);
+        }
+    }
+
+    #[test]
+    fn a_picture_has_the_same_bytes_each_time() {
+        assert!(from_above(&crossing(7e-4), false).rgb == from_above(&crossing(7e-4), false).rgb, "whatever thread draws which row");
+    }
+
+    #[test]
+    fn hits_lie_on_the_surface_and_normals_point_out() {
+        let turn = DVec3::new(0.3, -0.5, 0.8).normalize();
+        let pose = Pose::new(DVec3::new(0.1, 0.2, -0.1), sutura::glam::DQuat::from_axis_angle(turn, 0.9));
+        let (half, radius, length) = (DVec3::new(0.3, 0.2, 0.4), 0.25, 0.35);
+        // Signed distances in the frame of the body; of the box and the cylinder only their zero matters here.
+        let box_distance = |p: DVec3| (p.abs() - half).max_element();
+        let cylinder_distance = |p: DVec3| (p.x.hypot(p.y) - radius).max(p.z.abs() - length);
+        let capsule_distance = |p: DVec3| (p - DVec3::Z * p.z.clamp(-length, length)).length() - radius;
+        let ends = [-length, length].map(|z| pose.transform_point(DVec3::Z * z));
+        let cases: [(Primitive, &dyn Fn(DVec3) -> f64); 3] = [
+            (Primitive::Box { pose, half_sides: half }, &box_distance),
+            (Primitive::Cylinder { pose, radius, half_length: length }, &cylinder_distance),
+            (Primitive::Capsule(Capsule::new(ends[0], ends[1], radius)), &capsule_distance),
+        ];
+        for (primitive, distance) in &cases {
+            let mut dice = Dice::new(0);
+            let (mut hits, mut misses) = (0, 0);
+            for _ in 0..2000 {
+                let on_sphere = |(a, b): (f64, f64)| {
+                    let (z, turn) = (2.0 * a - 1.0, TAU * b);
+                    DVec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z)
+                };
+                let origin = pose.position + on_sphere(dice.pair()) * 3.0;
+                let toward = pose.position + on_sphere(dice.pair()) * 0.6;
+                let ray = Ray { origin, direction: (toward - origin).normalize() };
+                let inside = |t: f64| distance(pose.inverse_transform_point(ray.origin + ray.direction * t));
+                match primitive.hit(&ray, f64::INFINITY) {
+                    Some(hit) => {
+                        hits += 1;
+                        // Twelve digits are left of sixteen after the roots of a quadratic.
+                        assert!(inside(hit.t).abs() < 1e-11, "on the surface: {}", inside(hit.t));
+                        assert!((hit.normal.length() - 1.0).abs() < 1e-9 && hit.normal.dot(ray.direction) < 1e-9, "toward the eye");
+                        let b = primitive.bounds();
+                        let p = ray.origin + ray.direction * hit.t;
+                        assert!((b.low - 1e-9).cmple(p).all() && (b.high + 1e-9).cmpge(p).all(), "within its bounds");
+                        assert!(primitive.hit(&ray, 0.99 * hit.t).is_none(), "not beyond the limit");
+                    }
+                    None => {
+                        misses += 1;
+                        let nearest = (0..600).map(|k| inside(0.01 * f64::from(k))).fold(f64::INFINITY, f64::min);
+                        assert!(nearest > -1e-2, "a ray that is said to miss stays outside: {nearest}");
+                    }
+                }
+            }
+            assert!(hits > 200 && misses > 200, "both happen: {hits} and {misses}");
+        }
+    }
+
+    #[test]
+    fn a_triangle_is_hit_inside_its_sides() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        let down = |x: f64, y: f64| hit_triangle(&Ray { origin: DVec3::new(x, y, 2.0), direction: -DVec3::Z }, &corners, 10.0);
+        let hit = down(0.2, 0.3).expect("inside");
+        assert!((hit.t - 2.0).abs() < 1e-15 && hit.normal == DVec3::Z);
+        assert!(down(0.6, 0.6).is_none() && down(-0.1, 0.5).is_none());
+        let up = hit_triangle(&Ray { origin: DVec3::new(0.2, 0.3, -1.0), direction: DVec3::Z }, &corners, 10.0).expect("from below");
+        assert_eq!(up.normal, -DVec3::Z);
+    }
+
+    #[test]
+    fn everything_fits_into_the_picture() {
+        let points: Vec<DVec3> = (0..200).map(|i| f64::from(i) * 0.1).map(|t| DVec3::new(t.cos(), 2.0 * t.sin(), 0.3 * t) * 1e-2).collect();
+        for orthographic in [false, true] {
+            let look = Look { direction: Some(DVec3::new(0.4, 0.7, -0.3)), orthographic, ..Look::default() };
+            let camera = Camera::fit(&look, &points, 1e-3, Size { width: 400, height: 300 });
+            let mut widest = 0.0_f64;
+            for p in &points {
+                let d = *p - camera.at;
+                let depth = d.dot(camera.forward);
+                let scale = if orthographic { 1.0 } else { camera.distance / (camera.distance + depth) };
+                let (u, v) = (d.dot(camera.right) * scale / camera.half_width, d.dot(camera.up) * scale * camera.aspect / camera.half_width);
+                assert!(u.abs() < 1.0 && v.abs() < 1.0, "{u} {v}");
+                widest = widest.max(u.abs()).max(v.abs());
+            }
+            // A margin of a radius and a twelfth, no more than a third of the picture wasted.
+            assert!(widest > 0.66, "{widest}");
+        }
+    }
+
+    #[test]
+    fn the_smooth_curve_stays_near_the_polyline() {
+        let x: Vec<DVec3> = (0..=24).map(|i| f64::from(i) * 0.5).map(|t| DVec3::new(t.cos(), t.sin(), 0.2 * t)).collect();
+        let curve = smooth(&x);
+        assert_eq!((curve[0], curve[curve.len() - 1]), (x[0], x[24]));
+        // The second difference of a circle of radius 1 in steps of 0.5 rad is 2 (1 - cos 0.5) = 0.245: a sixteenth of it is 0.0153, and
+        // the curve's own second order adds a tenth. The first and last pieces, which begin at the end itself, keep within an eighth.
+        let far = |p: &DVec3| {
+            let to_segment = |w: &[DVec3]| {
+                let d = w[1] - w[0];
+                (*p - w[0] - d * ((*p - w[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0)).length()
+            };
+            x.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
+        };
+        let ends = |p: &&DVec3| [x[0], x[24]].iter().any(|e| (**p - *e).length() < 0.8);
+        assert!(curve.iter().map(far).fold(0.0, f64::max) < 0.0306);
+        let inner = curve.iter().filter(|p| !ends(p)).map(far).fold(0.0, f64::max);
+        assert!(inner < 0.0153 * 1.1, "{inner}");
+        let sharpest = curve.windows(3).map(|w| (w[1] - w[0]).angle_between(w[2] - w[1])).fold(0.0, f64::max);
+        assert!(sharpest < 0.16, "pieces of 0.08 rad, twice that where curves of different bend meet: {sharpest}");
+    }
+
+    #[test]
+    fn the_knot_region_is_where_thread_meets_thread() {
+        let crossing = crossing(7e-4);
+        let points = knot_region(&crossing.tubes);
+        assert!(!points.is_empty() && points.iter().all(|p| p.length() < 3e-3), "around the origin: {points:?}");
+        let straight = [Tube { points: (0..50).map(|i| DVec3::X * (f64::from(i) * 1e-3)).collect(), radius: 1e-4 }];
+        assert!(knot_region(&straight).is_empty(), "nothing to see on a straight thread");
+    }
 }

@@ -53,8 +53,9 @@ fn every_key_of_the_loader_is_documented() {
                 let is_key = call != ", \"" || after.starts_with(", Dim::");
                 if is_key && key.chars().all(|c| c.is_ascii_lowercase() || c == '_' || c.is_ascii_digit()) && !key.is_empty() {
                     count += 1;
-                    let found =
-                        [format!("`{key}"), format!("{key} ="), format!(", {key}"), format!("{{ {key}"), format!("{key} }}")].iter().any(|f| text.contains(f));
+                    let found = [format!("`{key}"), format!("[{key}"), format!("{key} ="), format!(", {key}"), format!("{{ {key}"), format!("{key} }}")]
+                        .iter()
+                        .any(|f| text.contains(f));
                     assert!(found, "`{key}` is read but not documented");
                 }
             }

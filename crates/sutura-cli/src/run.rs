@@ -70,9 +70,9 @@ pub fn simulate(mut runner: Runner, quiet: bool) -> Outcome {
         }
         if drawn.elapsed() > Duration::from_millis(50) {
             drawn = Instant::now();
-            bar.set_position((p.fraction.clamp(0.0, 1.0) * LENGTH as f64) as u64);
             let factor = if solver_ms > 0.0 { 1e3 * p.time / solver_ms } else { 0.0 };
             bar.set_message(format!("{}  {:.2} s  {factor:.1} x real time", p.phase, p.time));
+            bar.set_position((p.fraction.clamp(0.0, 1.0) * LENGTH as f64) as u64);
         }
     }
     bar.finish_and_clear();
@@ -339,7 +339,10 @@ fn summary(r: &Report) -> String {
     let verdict = match (r.passed, failed) {
         (true, _) if r.checks.is_empty() => "No checks in this scene.".to_string(),
         (true, _) => format!("All {} checks passed.", r.checks.len()),
-        (false, 0) => "FAILED: a phase ran out of time.".to_string(),
+        (false, 0) => {
+            let last = r.phases.last().map_or_else(String::new, |p| format!(" in phase `{}`: {}", p.name, p.ended_by));
+            format!("FAILED{last}.")
+        }
         (false, n) => format!("FAILED: {n} of {} checks.", r.checks.len()),
     };
     out.push_str(&verdict);

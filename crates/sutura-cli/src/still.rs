@@ -634,8 +634,8 @@ fn look_along(stage: &Stage, camera: &Camera, ray: &Ray, screen_y: f64, dice: &m
     let facing = -normal.dot(ray.direction);
     let sky = 0.5 + 0.5 * normal.dot(camera.up);
     // A weak light from the eye keeps the roundness of what lies in shadow.
-    let ambient = (0.18 + 0.2 * sky + 0.24 * facing) * (0.15 + 0.85 * open * open);
-    let diffuse = 0.7 * lit * normal.dot(toward_light).max(0.0);
+    let ambient = (0.24 + 0.2 * sky + 0.22 * facing) * (0.15 + 0.85 * open * open);
+    let diffuse = 0.66 * lit * normal.dot(toward_light).max(0.0);
     let half = (toward_light - ray.direction).normalize();
     let shine = 0.16 * lit * normal.dot(half).max(0.0).powi(40);
     // A dark rim outlines each tube against what lies behind it.

@@ -1,6 +1,5 @@
 //! Draws an overhand knot tight and lets it go; prints what happened. Arguments as `key=value`: see `Options`.
 
-use std::time::Instant;
 use sutura::audit::Audit;
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, recognize};
@@ -104,10 +103,10 @@ fn main() {
             world.set_grip_pose(left, l).unwrap();
             world.set_grip_pose(right, r).unwrap();
         }
-        let t0 = Instant::now();
+        let t0 = cpu_time::ThreadTime::now();
         let mut audit_time = 0.0;
         let report = world.step_with(dt, &mut |view| {
-            let t = Instant::now();
+            let t = cpu_time::ThreadTime::now();
             audit.observe(view);
             audit_time += t.elapsed().as_secs_f64();
         });

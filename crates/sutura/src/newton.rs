@@ -9,6 +9,7 @@ use crate::math::{exp, log, outer, skew};
 use crate::model::Model;
 use crate::rod::{element_strain, strain};
 use crate::row;
+use crate::row::pushed::Sliders;
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;
 use glam::{DMat3, DQuat, DVec3};
@@ -32,11 +33,14 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let settings = &model.settings;
     scratch.tension.copy_from_slice(&state.tension);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
+    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails.
+    let mut exact = true;
     while out.iterations < settings.newton_max {
         out.iterations += 1;
         row::thread::zones(scratch);
         let first = out.iterations == 1;
-        if !factor(model, state, scratch, h, Hessian::Exact, first) {
+        if !exact || !factor(model, state, scratch, h, Hessian::Exact, first) {
+            exact = false;
             factor(model, state, scratch, h, Hessian::Positive, first);
         }
         let blocks = core::mem::take(&mut scratch.rods);
@@ -46,16 +50,20 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             scratch.torque_correction.apply(&scratch.system, rod, zone, &scratch.torque, &mut scratch.step);
         }
         scratch.rods = blocks;
+        Sliders::factor(scratch);
+        scratch.rows.sliders.couple(&mut scratch.step, true);
         row::thread::couple(model, state, scratch);
         let scale = limit(model, state, scratch);
         apply(model, state, scratch, scale);
+        let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
+        out.residual = out.residual.max(slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
         let stretched = inextensible_error(model, state);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
         }
-        let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 10.0 * settings.tolerance);
+        let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.1);
         if scale >= 1.0 && settled && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
             out.converged = true;
             break;
@@ -76,7 +84,7 @@ enum Hessian {
 /// Assembles and factors. False when a pivot is not positive.
 fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
-    row::shape::assemble(model, state, scratch, first);
+    row::shape::assemble(model, state, scratch, h, first);
     restrict(state, scratch);
     let Scratch { system, rods, .. } = scratch;
     let mut positive = true;
@@ -227,7 +235,7 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
         }
     }
     assemble(model, state, scratch, h, Hessian::Positive);
-    row::shape::assemble(model, state, scratch, false);
+    row::shape::assemble(model, state, scratch, h, false);
     row::thread::add_forces(scratch);
 }
 

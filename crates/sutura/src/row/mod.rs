@@ -1,6 +1,7 @@
 //! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`], local).
 
 pub(crate) mod cone;
+pub(crate) mod pushed;
 pub(crate) mod shape;
 pub(crate) mod thread;
 
@@ -9,6 +10,7 @@ pub(crate) mod thread;
 pub(crate) struct Rows {
     pub shapes: Vec<shape::ShapeRow>,
     pub threads: Vec<thread::ThreadRow>,
+    pub sliders: pushed::Sliders,
     pub solver: thread::Coupling,
 }
 

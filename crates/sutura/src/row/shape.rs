@@ -1,10 +1,15 @@
 //! Contact of thread with shapes. A shape has no compliance of its own, so each contact touches one rod at one place and goes straight
 //! into that rod's matrix: cost is linear in the number of contacts.
 //!
-//! Normal: energy `k gap^2 / 2` for gap < 0, k = E r (the scale of Hertz stiffness), gap = signed distance of the centerline point less r.
-//! Friction: Coulomb with a tangential spring of the same k from the anchor of the last substep (Cundall and Strack 1979): while the
-//! trial force `f0 - k slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc.
+//! Normal: force `k gap^2` for gap < 0, gap = signed distance of the centerline point less r. It starts with zero slope, so that a thread that
+//! lies lightly on a shape does not rattle between touching and not, and stiffens as Hertz contact does; k is such that a force of
+//! `E r^2 / 1000` leaves a gap of -r / 100.
+//! Friction: Coulomb with a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one
+//! is at its load: while the trial force `f0 - stiffness * slip` is within mu times the normal force it sticks, and does not creep; beyond,
+//! the force stays on the disc.
 //! The tangential force acts at the surface, with its arm on the frame; the normal force at the centerline.
+//! A sliding contact enters with its secant stiffness, limit over trial length, in every tangential direction: with none along the slip
+//! (the tangent) a light thread spun by friction overshoots from slip to counter-slip for ever.
 //! The dependence of the disc on the normal force is left out of the matrix (it would be unsymmetric); iteration closes it.
 
 use crate::math::{Pose, log, outer, skew};
@@ -20,6 +25,8 @@ pub(crate) struct ShapeRow {
     element: u32,
     s: f64,
     radius: f64,
+    /// Normal force over gap squared \[N/m^2\], and normal stiffness at the last look \[N/m\].
+    hardness: f64,
     stiffness: f64,
     /// Friction coefficients sticking and sliding.
     mu: [f64; 2],
@@ -29,7 +36,6 @@ pub(crate) struct ShapeRow {
     /// Outward direction of the surface at the last look.
     normal: DVec3,
     gap: f64,
-    active: bool,
     /// Force on the thread at the last look.
     normal_force: f64,
     friction: DVec3,
@@ -39,6 +45,7 @@ pub(crate) struct ShapeRow {
 pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
     rows.shapes.clear();
+    rows.sliders.begin(model);
     let old = &state.shape_contacts;
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
@@ -83,13 +90,13 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 element: e as u32,
                 s,
                 radius: rod.radius,
-                stiffness: rod.contact_stiffness,
+                hardness: 10.0 * rod.material.young_modulus,
+                stiffness: 0.0,
                 mu: [friction.stick, friction.slide],
                 sliding: known.is_some_and(|c| c.sliding),
                 anchor,
                 normal,
                 gap: before.value - rod.radius,
-                active: known.is_some_and(|c| c.normal_force > 0.0) || now.value < rod.radius,
                 normal_force: known.map_or(0.0, |c| c.normal_force),
                 friction: DVec3::ZERO,
             });
@@ -120,20 +127,29 @@ fn look(model: &Model, state: &State, row: &mut ShapeRow) -> DVec3 {
     p
 }
 
-/// Adds forces and stiffness of the rows at the iterate. In the first iteration a row that carried force is taken to carry it still.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
+/// Adds forces and stiffness of the rows at the iterate. In the first iteration a row that carried force is
+/// linearized where it carried it: Newton starts where velocity leads, which may be just off the surface.
+pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, first: bool) {
     let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
+    rows.sliders.clear(model, state, start_shape_pose, h);
     for row in &mut rows.shapes {
         let p = look(model, state, row);
-        if !first {
-            row.active = row.gap < 0.0;
+        let (e, n) = (row.element as usize, row.normal);
+        let mut depth = (-row.gap).max(0.0);
+        row.stiffness = 2.0 * row.hardness * depth;
+        if first && row.normal_force > row.hardness * depth * depth {
+            let before = (row.normal_force / row.hardness).sqrt();
+            row.stiffness = 2.0 * row.hardness * before;
+            row.normal_force += row.stiffness * (-row.gap - before);
+            depth = before;
+        } else {
+            row.normal_force = row.hardness * depth * depth;
         }
-        if !row.active {
-            (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
+        if depth == 0.0 {
+            row.friction = DVec3::ZERO;
             continue;
         }
-        let (e, n, k) = (row.element as usize, row.normal, row.stiffness);
-        row.normal_force = -k * row.gap;
+        let k = row.stiffness;
         let arm = n * -row.radius;
         let turned = log(state.orientation[e] * start_frame[e].conjugate());
         let moved = p - start[e].lerp(start[e + 1], row.s) + turned.cross(arm) - surface_motion(&start_shape_pose[row.shape as usize], &state.shape_pose[row.shape as usize], p + arm);
@@ -152,7 +168,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, firs
             let limit = row.mu[1] * row.normal_force.max(0.0);
             let d = trial / size;
             row.friction = d * limit;
-            outer(n, n) * k + (across - outer(d, d)) * (k * limit / size)
+            outer(n, n) * k + across * (k * limit / size)
         };
         let (a, b) = (1.0 - row.s, row.s);
         let force = n * row.normal_force + row.friction;
@@ -167,6 +183,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, firs
         system.next[2 * e] += kt * a;
         system.next[2 * e + 1] += kt.transpose() * b;
         system.diagonal[2 * e + 1] += turn.transpose() * kt;
+        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &turn);
     }
 }
 
@@ -175,17 +192,19 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
     if from == to { DVec3::ZERO } else { point - from.transform_point(to.inverse_transform_point(point)) }
 }
 
-/// Whether the iterate agrees with the forces that it was computed with: no contact opened or closed, no friction disc that changed.
+/// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization.
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let rows = &mut scratch.rows.shapes;
     let largest = rows.iter().map(|r| r.normal_force).fold(0.0, f64::max);
     rows.iter_mut().all(|row| {
-        let (gap, force, active) = (row.gap, row.normal_force, row.active);
+        let (gap, normal) = (row.gap, row.normal);
         look(model, state, row);
-        let now = row.stiffness * (-row.gap).max(0.0);
-        row.gap = gap;
-        let opened = active != (now > 0.0) && (now - force).abs() > 1e-3 * largest;
-        !opened && (now - force).abs() * row.mu[0] <= 1e-2 * largest
+        let predicted = (row.normal_force - row.stiffness * (row.gap - gap)).max(0.0);
+        let now = row.hardness * (-row.gap).max(0.0).powi(2);
+        (row.gap, row.normal) = (gap, normal);
+        // Forces under a millionth of E r^2 do not move a thread.
+        let floor = 1e-7 * row.hardness * row.radius * row.radius;
+        (now - predicted).abs() <= 0.02 * largest + floor
     })
 }
 
@@ -197,7 +216,7 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
         if row.gap >= 0.0 {
             continue;
         }
-        let normal_force = -row.stiffness * row.gap;
+        let normal_force = row.hardness * row.gap * row.gap;
         let limit = row.mu[0] * normal_force;
         let friction = (row.friction - row.normal * row.normal.dot(row.friction)).clamp_length_max(limit);
         state.shape_contacts.push(ShapeContact { shape: row.shape, element: row.element, s: row.s, normal: row.normal, normal_force, friction, sliding: row.sliding });

@@ -67,6 +67,9 @@ pub(crate) struct Coupling {
     force: Vec<f64>,
     cone: Cone,
     right: Vec<DVec3>,
+    /// Response of each row to the pushed shapes.
+    reach: Vec<f64>,
+    small: Vec<f64>,
     fresh: Vec<ThreadRow>,
 }
 
@@ -250,7 +253,7 @@ pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
     if rows.threads.is_empty() {
         return;
     }
-    let Coupling { active, endpoints, blocks, jumps, s, b, mu, force, cone, right, .. } = &mut rows.solver;
+    let Coupling { active, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, .. } = &mut rows.solver;
     active.clear();
     b.clear();
     mu.clear();
@@ -313,6 +316,29 @@ pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
         }
         compliance_between(system, endpoints, blocks, jumps, s, n);
     }
+    // What gives way with the pushed shapes: W grows by H^-1 B schur^-1 B^T H^-1.
+    let m = (0..).take_while(|k| rows.sliders.response(*k).is_some()).count();
+    if m > 0 {
+        reach.clear();
+        for index in active.iter() {
+            let ends = rows.threads[*index as usize].endpoints(0);
+            for axis in 0..3 {
+                for k in 0..m {
+                    let w = rows.sliders.response(k).unwrap_or(&[]);
+                    let part = |p: &Endpoint| p.here.x.col(axis).dot(w[2 * p.element]) + p.here.t.col(axis).dot(w[2 * p.element + 1]) + p.next.col(axis).dot(w[2 * p.element + 2]);
+                    reach.push(part(&ends[0]) + part(&ends[1]));
+                }
+            }
+        }
+        for i in 0..n {
+            small.clear();
+            small.extend_from_slice(&reach[i * m..(i + 1) * m]);
+            rows.sliders.solve_small(small);
+            for j in i..n {
+                s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
     for k in 0..active.len() {
         let c = rows.threads[active[k] as usize].compliance;
         for i in 3 * k..3 * k + 3 {
@@ -349,6 +375,7 @@ pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
     for (rod, zone) in rods.iter() {
         system.solve(rod.clone(), zone, right);
     }
+    rows.sliders.couple(right, false);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
     }

@@ -1,1 +1,48 @@
-fn main() {}
+//! Chores of this repository, run as `cargo xtask <command>`. Every command that the checks consist of is written down here and nowhere
+//! else; `.ci/run` only calls `cargo xtask ci`.
+
+mod ci;
+mod program;
+mod release;
+mod tally;
+
+use std::process::ExitCode;
+use tally::Tally;
+
+const HELP: &str = "\
+cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes, same bits on every run
+cargo xtask test [ARGS]      all tests (`cargo test --workspace`), with a count at the end
+cargo xtask scenes [NAMES]   run sample scenes with the release build; all of them without names
+cargo xtask bench [ARGS]     `sutura bench` with the release build
+cargo xtask bless            run the square knot and take its last picture for the README
+cargo xtask release          is this commit ready to be released? (changes nothing)";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let Some((command, rest)) = args.split_first() else {
+        println!("{HELP}");
+        return ExitCode::SUCCESS;
+    };
+    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench");
+    let mut tally = Tally::default();
+    match command.as_str() {
+        _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
+        "ci" => ci::everything(&mut tally),
+        "test" => ci::tests(&mut tally, rest),
+        "scenes" => ci::scenes(&mut tally, rest),
+        "bench" => program::bench(&mut tally, rest),
+        "bless" => program::bless(&mut tally),
+        "release" => release::ready(&mut tally),
+        "help" | "--help" | "-h" => {
+            println!("{HELP}");
+            return ExitCode::SUCCESS;
+        }
+        _ => return usage(&format!("there is no command `{command}`")),
+    }
+    tally.close()
+}
+
+fn usage(problem: &str) -> ExitCode {
+    eprintln!("error: {problem}\n\n{HELP}");
+    ExitCode::from(2)
+}

@@ -1,0 +1,108 @@
+//! The command-line program `sutura`: builds it, runs scenes with it and reads their reports.
+
+use crate::tally::{Tally, cargo, root, status_within, target};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// With which optimization the program is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Profile {
+    Debug,
+    Release,
+}
+
+/// A program that was built.
+pub struct Program {
+    path: PathBuf,
+}
+
+/// What a run reported, as far as the checks need it.
+pub struct Report {
+    pub state_hash: String,
+    pub simulated: f64,
+    pub cpu: f64,
+}
+
+/// Builds the program; `None` (and a failed step) when it does not build.
+pub fn build(tally: &mut Tally, profile: Profile) -> Option<Program> {
+    let (name, folder) = match profile {
+        Profile::Debug => ("debug build", "debug"),
+        Profile::Release => ("release build", "release"),
+    };
+    let mut command = cargo(&["build", "--package", "sutura-cli"]);
+    if profile == Profile::Release {
+        command.arg("--release");
+    }
+    let path = target().join(folder).join(format!("sutura{}", std::env::consts::EXE_SUFFIX));
+    tally.run(name, &mut command).then_some(Program { path })
+}
+
+impl Program {
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.path);
+        command.current_dir(root()).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs a sample scene without pictures; an error when it ends with another exit code than 0.
+    pub fn run_scene(&self, name: &str, run: &str, limit: Duration) -> Result<Report, String> {
+        let out = target().join("scenes").join(run);
+        let file = format!("scenes/{name}.toml");
+        let mut command = self.command();
+        command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--no-trajectory", "--out"]).arg(&out);
+        // A report of an earlier run must not pass for that of this one.
+        let _ = std::fs::remove_file(out.join("report.json"));
+        let ended = status_within(&mut command, limit);
+        let report = read(&out.join("report.json"));
+        match (ended, report) {
+            (Ok(()), Ok((report, _))) => Ok(report),
+            (Err(why), Ok((_, failed))) if !failed.is_empty() => Err(format!("{why}: {}", failed.join("; "))),
+            (Err(why), _) | (_, Err(why)) => Err(why),
+        }
+    }
+}
+
+/// The report in a folder, and its checks that failed.
+fn read(path: &Path) -> Result<(Report, Vec<String>), String> {
+    let problem = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
+    let text = std::fs::read_to_string(path).map_err(|e| problem(&e))?;
+    let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| problem(&e))?;
+    let number = |key: &str| json[key].as_f64().ok_or_else(|| problem(&format!("no number `{key}`")));
+    let state_hash = json["state_hash"].as_str().ok_or_else(|| problem(&"no `state_hash`"))?.to_string();
+    let checks = json["checks"].as_array().into_iter().flatten().filter(|c| c["passed"] == false);
+    let failed = checks.map(|c| format!("{} is {}, wanted {}", c["name"], c["value"], c["wanted"])).collect();
+    Ok((Report { state_hash, simulated: number("simulated_s")?, cpu: number("cpu_s")? }, failed))
+}
+
+/// Times the release build.
+pub fn bench(tally: &mut Tally, args: &[String]) {
+    if let Some(sutura) = build(tally, Profile::Release) {
+        tally.run("bench", sutura.command().arg("bench").args(args));
+    }
+}
+
+/// Runs the main job and takes its last near picture for the README.
+pub fn bless(tally: &mut Tally) {
+    let Some(sutura) = build(tally, Profile::Release) else { return };
+    let out = target().join("scenes/square_knot-picture");
+    let mut run = sutura.command();
+    run.args(["run", "scenes/square_knot.toml", "--no-plots", "--no-trajectory", "--out"]).arg(&out);
+    if !tally.run("square knot", &mut run) {
+        return;
+    }
+    let picture = root().join("docs/images/square_knot.png");
+    tally.count("picture", take_last_near_picture(&out.join("stills"), &picture));
+    println!("   {}", picture.display());
+}
+
+/// Pictures are named by their time, with leading zeros; those of the knot alone end in `-near`.
+fn take_last_near_picture(stills: &Path, picture: &Path) -> Result<(), String> {
+    let entries = std::fs::read_dir(stills).map_err(|e| format!("{}: {e}", stills.display()))?;
+    let near = entries.filter_map(|e| e.ok().map(|e| e.path())).filter(|p| p.to_string_lossy().ends_with("-near.png"));
+    let last = near.max().ok_or_else(|| format!("no picture of a knot in {}", stills.display()))?;
+    if let Some(folder) = picture.parent() {
+        std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+    }
+    std::fs::copy(&last, picture).map(|_| ()).map_err(|e| format!("{}: {e}", picture.display()))
+}

@@ -17,6 +17,9 @@ use glam::{DMat3, DQuat, DVec3};
 /// Elongation to which inextensible elements are held.
 const LENGTH_TOLERANCE: f64 = 5e-6;
 
+/// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is shortened.
+const OVERSHOOT: f64 = 0.5;
+
 /// How a Newton solve ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
@@ -35,13 +38,31 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails.
     let mut exact = true;
+    // Work of the forces along the last step, over its full length, and the part of it that was taken.
+    let (mut gained, mut scale) = (0.0, 1.0);
     while out.iterations < settings.newton_max {
         out.iterations += 1;
         row::thread::zones(scratch);
         let first = out.iterations == 1;
-        if !exact || !factor(model, state, scratch, h, Hessian::Exact, first) {
-            exact = false;
-            factor(model, state, scratch, h, Hessian::Positive, first);
+        let mut taken = 1.0;
+        loop {
+            exact = exact && factor(model, state, scratch, h, Hessian::Exact, first);
+            if !exact {
+                factor(model, state, scratch, h, Hessian::Positive, first);
+            }
+            if first || taken < 0.2 {
+                break;
+            }
+            // Where the force along the last step has turned round the step went too far: contacts opened, closed or began to slide on
+            // the way. Go back to where a straight line between the two forces says that it vanishes.
+            let left = work(scratch);
+            if left > -OVERSHOOT * gained {
+                break;
+            }
+            let part = gained / (gained - left);
+            apply(model, state, scratch, -(1.0 - part) * taken * scale);
+            scratch.rows.sliders.apply(state, -(1.0 - part) * taken * scale);
+            taken *= part;
         }
         let blocks = core::mem::take(&mut scratch.rods);
         scratch.step.copy_from_slice(&scratch.rhs);
@@ -53,7 +74,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         Sliders::factor(scratch);
         scratch.rows.sliders.couple(&mut scratch.step, true);
         row::thread::couple(model, state, scratch);
-        let scale = limit(model, state, scratch);
+        gained = work(scratch);
+        scale = limit(model, state, scratch);
         apply(model, state, scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
@@ -63,13 +85,19 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             out.finite = false;
             return out;
         }
-        let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.1);
+        let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
         if scale >= 1.0 && settled && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
             out.converged = true;
             break;
         }
     }
     out
+}
+
+/// Work of the forces at the iterate, contact forces as last found, along the last step.
+fn work(scratch: &Scratch) -> f64 {
+    let own: f64 = scratch.rhs.iter().zip(&scratch.step).map(|(r, z)| r.dot(*z)).sum();
+    own + row::thread::work(scratch) + scratch.rows.sliders.work()
 }
 
 /// Which second derivatives of the elastic energy go into the matrix. The residual is exact in either case.

@@ -136,6 +136,11 @@ impl Sliders {
         }
     }
 
+    /// Work of the forces on the shapes along their step.
+    pub fn work(&self) -> f64 {
+        self.sliders[..self.count].iter().map(|s| s.right * s.step).sum()
+    }
+
     /// Number of sliders, and the response of the rods to slider `k`.
     pub fn response(&self, k: usize) -> Option<&[DVec3]> {
         (k < self.count).then(|| self.sliders[k].response.as_slice())

@@ -440,6 +440,13 @@ pub(crate) fn add_forces(scratch: &mut Scratch) {
     }
 }
 
+/// Work of the rows' forces along the step.
+pub(crate) fn work(scratch: &Scratch) -> f64 {
+    let step = &scratch.step;
+    let along = |p: &Endpoint, f: DVec3| (p.here.x * f).dot(step[2 * p.element]) + (p.here.t * f).dot(step[2 * p.element + 1]) + (p.next * f).dot(step[2 * p.element + 2]);
+    scratch.rows.threads.iter().filter(|r| r.force != DVec3::ZERO).map(|r| r.endpoints(0).iter().map(|p| along(p, r.force)).sum::<f64>()).sum()
+}
+
 /// Factor on the update so that no pair of centerlines comes nearer in one iteration than most of the way to the least distance allowed.
 pub(crate) fn limit(_model: &Model, state: &State, scratch: &Scratch, scale: f64) -> f64 {
     let x = &state.position;

@@ -19,10 +19,13 @@ pub fn everything(tally: &mut Tally) {
     tally.run("format", &mut cargo(&["fmt", "--check", "--all"]));
     tally.run("lints", &mut cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"]));
     tests(tally, &[]);
-    // The two programs have nothing to document beyond their own help.
-    let mut doc = cargo(&["doc", "--no-deps", "--package", "sutura", "--package", "sutura-scene"]);
+    // The programs have nothing to document beyond their own help. Steps select the whole workspace where they can: a part of it
+    // would choose other features of the dependencies and build them again.
+    let mut doc = cargo(&["doc", "--workspace", "--lib", "--no-deps"]);
     tally.run("documentation", doc.env("RUSTDOCFLAGS", "--deny warnings"));
-    tally.run("example of the README", &mut cargo(&["run", "--quiet", "--package", "sutura", "--example", "first_thread"]));
+    if program::build(tally, Profile::Debug).is_some() {
+        tally.run("example of the README", &mut program::example("first_thread"));
+    }
     scenes(tally, &[]);
     same_bits(tally);
 }

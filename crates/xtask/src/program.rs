@@ -26,16 +26,21 @@ pub struct Report {
 
 /// Builds the program; `None` (and a failed step) when it does not build.
 pub fn build(tally: &mut Tally, profile: Profile) -> Option<Program> {
-    let (name, folder) = match profile {
-        Profile::Debug => ("debug build", "debug"),
-        Profile::Release => ("release build", "release"),
+    let (name, folder, args) = match profile {
+        // The tests build program and examples too, so after them there is nothing left to build.
+        Profile::Debug => ("debug build", "debug", ["test", "--quiet", "--workspace", "--no-run"]),
+        Profile::Release => ("release build", "release", ["build", "--release", "--package", "sutura-cli"]),
     };
-    let mut command = cargo(&["build", "--package", "sutura-cli"]);
-    if profile == Profile::Release {
-        command.arg("--release");
-    }
+    let mut command = cargo(&args);
     let path = target().join(folder).join(format!("sutura{}", std::env::consts::EXE_SUFFIX));
     tally.run(name, &mut command).then_some(Program { path })
+}
+
+/// An example of the debug build.
+pub fn example(name: &str) -> Command {
+    let mut command = Command::new(target().join("debug/examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)));
+    command.current_dir(root()).stdin(Stdio::null());
+    command
 }
 
 impl Program {

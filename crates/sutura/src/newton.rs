@@ -17,6 +17,8 @@ use glam::{DMat3, DQuat, DVec3};
 /// Elongation to which inextensible elements are held.
 const LENGTH_TOLERANCE: f64 = 5e-6;
 
+/// Least part of a step that is taken: a contact met on the way must be met, or the next step does not know of it.
+const SHORTEST: f64 = 0.3;
 /// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is shortened.
 const OVERSHOOT: f64 = 0.5;
 
@@ -59,7 +61,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             if left > -OVERSHOOT * gained {
                 break;
             }
-            let part = gained / (gained - left);
+            let part = (gained / (gained - left)).max(SHORTEST);
             apply(model, state, scratch, -(1.0 - part) * taken * scale);
             scratch.rows.sliders.apply(state, -(1.0 - part) * taken * scale);
             taken *= part;

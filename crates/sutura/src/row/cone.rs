@@ -16,7 +16,7 @@ pub(crate) struct Limits {
     pub outer: f64,
     pub max_inner: u32,
     pub max_outer: u32,
-    /// Weight of the proximal term over the mean compliance of a contact.
+    /// Weight of the proximal term over the normal compliance of a contact.
     pub proximal: f64,
 }
 
@@ -61,8 +61,9 @@ impl Cone {
         self.disc.resize(m, 0.0);
         for c in 0..m {
             let i = 3 * c;
-            let mean = (s[i * n + i] + s[(i + 1) * n + i + 1] + s[(i + 2) * n + i + 2]) / 3.0;
-            self.prox[i..i + 3].fill(limits.proximal * mean);
+            // By the normal compliance in all directions: the tangential one may be a thousand times larger (a thread that spins freely),
+            // and as a measure it would tie the normal force to its last value.
+            self.prox[i..i + 3].fill(limits.proximal * s[i * n + i]);
             l[i] = l[i].max(0.0);
             self.disc[c] = mu[c] * l[i];
         }

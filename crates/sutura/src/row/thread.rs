@@ -27,6 +27,8 @@ pub(crate) struct ThreadRow {
     t: f64,
     /// Normal from b toward a and two tangents.
     axes: [DVec3; 3],
+    /// Directions of the two threads.
+    along: [DVec3; 2],
     /// Distance kept between the centerlines \[m\] and the two radii.
     sum: f64,
     radii: [f64; 2],
@@ -86,6 +88,7 @@ impl ThreadRow {
             s,
             t,
             axes: [normal, t1, normal.cross(t1)],
+            along: [along.normalize(), (start[b + 1] - start[b]).normalize()],
             sum: (ra.radius + rb.radius) * (1.0 + params::KEEP),
             radii: [ra.radius, rb.radius],
             compliance: 1.0 / ra.contact_stiffness + 1.0 / rb.contact_stiffness,
@@ -104,24 +107,28 @@ impl ThreadRow {
 
     /// Slip of the two surfaces against each other since the start of the substep, linear in the rotations, as a vector.
     fn slip(&self, state: &State, scratch_start: &[DVec3], start_frame: &[glam::DQuat]) -> DVec3 {
-        let turned = |e: usize| log(state.orientation[e] * start_frame[e].conjugate());
+        let turned = |e: usize, k: usize| {
+            let turn = log(state.orientation[e] * start_frame[e].conjugate());
+            turn - self.along[k] * self.along[k].dot(turn)
+        };
         let n = self.axes[0];
         let moved = self.apart(&state.position) - self.apart(scratch_start);
-        let spin = turned(self.a).cross(n * -self.radii[0]) - turned(self.b).cross(n * self.radii[1]);
+        let spin = turned(self.a, 0).cross(n * -self.radii[0]) - turned(self.b, 1).cross(n * self.radii[1]);
         let slip = moved + spin;
         slip - n * n.dot(slip)
     }
 
     fn endpoints(&self, row: u32) -> [Endpoint; 2] {
-        let side = |element: usize, s: f64, sign: f64, arm: DVec3| {
+        let side = |element: usize, s: f64, sign: f64, arm: DVec3, along: DVec3| {
             let [n, t1, t2] = self.axes;
             let axes = DMat3::from_cols(n, t1, t2) * sign;
             // The normal force acts at the centerline, friction at the surface.
-            let turn = DMat3::from_cols(DVec3::ZERO, arm.cross(t1), arm.cross(t2)) * sign;
+            let across = |v: DVec3| v - along * along.dot(v);
+            let turn = DMat3::from_cols(DVec3::ZERO, across(arm.cross(t1)), across(arm.cross(t2))) * sign;
             Endpoint { element, row, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
         };
         let n = self.axes[0];
-        [side(self.a, self.s, 1.0, n * -self.radii[0]), side(self.b, self.t, -1.0, n * self.radii[1])]
+        [side(self.a, self.s, 1.0, n * -self.radii[0], self.along[0]), side(self.b, self.t, -1.0, n * self.radii[1], self.along[1])]
     }
 
     fn key(&self) -> (usize, usize) {
@@ -271,7 +278,8 @@ pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
             continue;
         }
         smallest = smallest.min(r);
-        let spin = step[2 * row.a + 1].cross(n * -row.radii[0]) - step[2 * row.b + 1].cross(n * row.radii[1]);
+        let turn = |e: usize, k: usize| step[2 * e + 1] - row.along[k] * row.along[k].dot(step[2 * e + 1]);
+        let spin = turn(row.a, 0).cross(n * -row.radii[0]) - turn(row.b, 1).cross(n * row.radii[1]);
         let slip = row.slip(state, start, start_frame) + moved + spin + row.drift - row.anchor * row.compliance;
         active.push(k as u32);
         // An overlap from before is pushed out over a few substeps.

@@ -76,7 +76,14 @@ fn main() {
     let n = (length / (o.l * 2.0 * o.r)).round() as usize;
     let mut material = Material::elastic(o.e, 1150.0);
     material.bend_damping = o.tau;
-    let settings = Settings { gravity: DVec3::ZERO, substep: 1.0 / o.sub, friction: Friction::coulomb(o.mu), linear_damping: 0.9, angular_damping: 0.9, ..Settings::default() };
+    let settings = Settings {
+        gravity: DVec3::ZERO,
+        substep: 1.0 / o.sub,
+        friction: Friction::coulomb(o.mu),
+        linear_damping: 0.9,
+        angular_damping: 0.9,
+        ..Settings::default()
+    };
     let mut world = World::new(settings).unwrap();
     let rod = world.insert_rod(&RodSpec::new(overhand(length, n), o.r, material)).unwrap();
     let left = world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
@@ -95,7 +102,12 @@ fn main() {
         if held {
             // Turn toward the axis between the ends while drawing apart.
             let axis = (r.position - l.position).normalize();
-            let turn = |p: &Pose, to: DVec3| Pose::new(p.position, (sutura::math::rotation_arc(p.orientation * DVec3::Z, (p.orientation * DVec3::Z).lerp(to, 0.05).normalize()) * p.orientation).normalize());
+            let turn = |p: &Pose, to: DVec3| {
+                Pose::new(
+                    p.position,
+                    (sutura::math::rotation_arc(p.orientation * DVec3::Z, (p.orientation * DVec3::Z).lerp(to, 0.05).normalize()) * p.orientation).normalize(),
+                )
+            };
             l = turn(&l, axis);
             r = turn(&r, axis);
             l.position -= axis * (o.speed * dt);
@@ -120,7 +132,13 @@ fn main() {
         if o.verbose && frame % 10 == 0 {
             eprintln!(
                 "t {:.3} tension {tension:.4} ms {:.2} sub {} rej {} newton {} contacts {} clear {:?} incidents {:?}",
-                report.time, times[times.len() - 1], report.substeps, report.rejected, report.newton_iterations, report.contacts, report.thread_clearance,
+                report.time,
+                times[times.len() - 1],
+                report.substeps,
+                report.rejected,
+                report.newton_iterations,
+                report.contacts,
+                report.thread_clearance,
                 report.incidents.first()
             );
         }
@@ -137,7 +155,8 @@ fn main() {
             };
             if !reason.is_empty() {
                 end_reason = reason;
-                let knot = recognize(view.positions(), Ends::Held { start: -(r.position - l.position).normalize(), end: (r.position - l.position).normalize() }, 1);
+                let knot =
+                    recognize(view.positions(), Ends::Held { start: -(r.position - l.position).normalize(), end: (r.position - l.position).normalize() }, 1);
                 eprintln!("drawn: {reason} at {:.3} s, tension {tension:.3} N, {knot}, length left {:.1} d", world.time(), (length - span) / (2.0 * o.r));
                 held = false;
                 world.remove_grip(left).unwrap();
@@ -155,7 +174,21 @@ fn main() {
     let q = |p: f64| times[((times.len() - 1) as f64 * p) as usize];
     println!(
         "r={} e={:e} speed={} mu={} l={} | passes {} clear {:?} ms {:.2}/{:.2}/{:.2} sub/frame {:.1} rej {} newton/sub {:.2} incidents {} | {} | {}",
-        o.r * 1e3, o.e, o.speed, o.mu, o.l, report.passes_through, report.thread_clearance.map(|c| (c * 1e3).round() / 1e3), q(0.5), q(0.99), q(1.0),
-        f64::from(subs) / times.len() as f64, rejected, f64::from(newton) / f64::from(subs + rejected), incidents, end_reason, knot
+        o.r * 1e3,
+        o.e,
+        o.speed,
+        o.mu,
+        o.l,
+        report.passes_through,
+        report.thread_clearance.map(|c| (c * 1e3).round() / 1e3),
+        q(0.5),
+        q(0.99),
+        q(1.0),
+        f64::from(subs) / times.len() as f64,
+        rejected,
+        f64::from(newton) / f64::from(subs + rejected),
+        incidents,
+        end_reason,
+        knot
     );
 }

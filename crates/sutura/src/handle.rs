@@ -100,7 +100,4 @@ impl<T> Slots<T> {
     pub(crate) fn at(&self, index: u32) -> Option<&T> {
         self.slots.get(index as usize).and_then(|(_, v)| v.as_ref())
     }
-    pub(crate) fn handle<K>(&self, index: u32) -> Handle<K> {
-        Handle::new(index, self.slots[index as usize].0)
-    }
 }

@@ -75,9 +75,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         scratch.rods = blocks;
         Sliders::factor(scratch);
         scratch.rows.sliders.couple(&mut scratch.step, true);
-        row::thread::couple(model, state, scratch);
+        row::thread::couple(state, scratch);
         gained = work(scratch);
-        scale = limit(model, state, scratch);
+        scale = limit(state, scratch);
         apply(model, state, scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
@@ -270,10 +270,10 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
 }
 
 /// Factor on the update: no element turns by more than 0.3 rad in an iteration, and no pair of threads gets closer than half its gap.
-fn limit(model: &Model, state: &State, scratch: &Scratch) -> f64 {
+fn limit(state: &State, scratch: &Scratch) -> f64 {
     let turn = scratch.step.iter().skip(1).step_by(2).map(|v| v.length_squared()).fold(0.0, max_or_nan).sqrt();
     let by_turn = if turn > 0.3 { 0.3 / turn } else { 1.0 };
-    by_turn.min(row::thread::limit(model, state, scratch, by_turn))
+    by_turn.min(row::thread::limit(state, scratch, by_turn))
 }
 
 /// Maximum that keeps NaN.

@@ -15,7 +15,11 @@ pub(crate) enum Freedom {
     Free,
     Held,
     /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the substep, \[N/m\]).
-    Line { direction: DVec3, force: f64, damper: f64 },
+    Line {
+        direction: DVec3,
+        force: f64,
+        damper: f64,
+    },
 }
 
 impl Freedom {

@@ -42,21 +42,12 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
 }
 
 /// Advances from `t` by `h`, or in two halves when the result is not acceptable. False when it got stuck.
-#[allow(clippy::too_many_arguments)]
-fn advance(
-    model: &Model,
-    state: &mut State,
-    scratch: &mut Scratch,
-    interval: &mut Interval<'_>,
-    t: f64,
-    h: f64,
-    depth: u32,
-    report: &mut StepReport,
-) -> bool {
+#[allow(clippy::too_many_arguments, reason = "the recursion on halves hands all of them on")]
+fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, t: f64, h: f64, depth: u32, report: &mut StepReport) -> bool {
     save(state, scratch, depth);
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
-    row::thread::begin(model, state, scratch, h);
+    row::thread::begin(model, state, scratch);
     row::shape::begin(model, state, scratch);
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
@@ -156,10 +147,7 @@ fn grip_pose(grip: &GripState, interval: &Interval<'_>, t: f64) -> Pose {
         return command;
     }
     let along = t - grip.taken_at;
-    let own = Pose::new(
-        grip.taken_pose.position + grip.taken_velocity * along,
-        (exp(grip.taken_spin * along) * grip.taken_pose.orientation).normalize(),
-    );
+    let own = Pose::new(grip.taken_pose.position + grip.taken_velocity * along, (exp(grip.taken_spin * along) * grip.taken_pose.orientation).normalize());
     own.interpolate(&command, smoothstep(u.max(0.0)))
 }
 

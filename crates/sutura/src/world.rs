@@ -473,7 +473,8 @@ impl World {
     fn report_teleports(&self, dt: f64, report: &mut StepReport) {
         const FASTEST: f64 = 100.0;
         let grips = self.state.grips.iter().map(|(_, g)| (g.target.position - g.pose.position).length());
-        let shapes = self.model.shapes.iter().map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
+        let shapes =
+            self.model.shapes.iter().map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
         for distance in grips.chain(shapes).filter(|d| *d > FASTEST * dt) {
             report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
         }
@@ -540,8 +541,12 @@ impl World {
             }
         }
         let element = |e: u32| (e as usize) < n && self.model.is_element(e as usize);
-        let threads = s.thread_contacts.iter().all(|c| element(c.a) && element(c.b) && c.a < c.b && c.normal.is_finite() && c.friction.is_finite() && c.normal_force.is_finite());
-        let shapes = s.shape_contacts.iter().all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && c.normal.is_finite() && c.friction.is_finite());
+        let threads = s
+            .thread_contacts
+            .iter()
+            .all(|c| element(c.a) && element(c.b) && c.a < c.b && c.normal.is_finite() && c.friction.is_finite() && c.normal_force.is_finite());
+        let shapes =
+            s.shape_contacts.iter().all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && c.normal.is_finite() && c.friction.is_finite());
         if !(threads && shapes) {
             return Err("a contact is out of range");
         }

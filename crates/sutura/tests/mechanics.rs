@@ -2,7 +2,7 @@
 
 mod support;
 
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::TAU;
 use support::{quiet, settle, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{GripSpec, Handle, Hold, LoadKind, LoadSpec, Place, Pose, Rod, RodSpec, Settings, Stretch, World};
@@ -37,7 +37,6 @@ fn elastica_under_tip_load_is_second_order() {
             let p = tip(&world, rod) / length;
             errors.push((p - DVec3::new(x, 0.0, -drop)).length());
         }
-        eprintln!("k {k}: {errors:?}");
         // The tables have six digits; stretch and shear of this rod are 1e-5 of its length.
         assert!(errors[2] < 1e-3, "k {k}: {errors:?}");
         assert!(errors[0] / errors[1] > 3.0 && errors[1] / errors[2] > 3.0, "order under 1.6 at k {k}: {errors:?}");
@@ -51,26 +50,31 @@ fn elastica_under_self_weight() {
         let (mut world, rod) = cantilever(length, 100, Settings { gravity: DVec3::NEG_Z * 9.81, ..quiet() });
         settle(&mut world, 0.1, 1e-7, 300.0);
         let got = -tip(&world, rod).z;
-        eprintln!("{length}: {got} {}", got / drop - 1.0);
         assert!((got / drop - 1.0).abs() < 2e-3, "{length}: {got} {drop}");
     }
 }
 
 #[test]
-fn a_tip_moment_of_a_full_turn_closes_the_circle() {
-    let length = 0.05;
-    let (mut world, rod) = cantilever(length, 40, quiet());
-    let (ei, _) = world.rod(rod).unwrap().bending_stiffness();
-    let load = world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: DVec3::ZERO } }).unwrap();
-    for i in 1..=40 {
-        let torque = DVec3::NEG_Y * (TAU * ei / length * f64::from(i) / 40.0);
-        world.set_load(load, LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque }).unwrap();
-        world.step(0.1);
+fn a_tip_moment_of_a_quarter_turn_makes_a_quarter_circle() {
+    // A dead moment has no energy: from about half a turn on it feeds a flutter out of the plane. A quarter turn is stable.
+    let mut errors = Vec::new();
+    for n in [20, 40] {
+        let length = 0.05;
+        let (mut world, rod) = cantilever(length, n, quiet());
+        let (ei, _) = world.rod(rod).unwrap().bending_stiffness();
+        let torque = DVec3::NEG_Y * (core::f64::consts::FRAC_PI_2 * ei / length);
+        let load = world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: DVec3::ZERO } }).unwrap();
+        for i in 1..=40 {
+            world.set_load(load, LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: torque * (f64::from(i) / 40.0) }).unwrap();
+            world.step(0.1);
+        }
+        for _ in 0..100 {
+            world.step(0.1);
+        }
+        errors.push((tip(&world, rod) / length - DVec3::new(1.0, 0.0, 1.0) * core::f64::consts::FRAC_2_PI).length());
     }
-    settle(&mut world, 0.1, 1e-8, 100.0);
-    // The torque acts on the last frame, half an element before the tip: the last half is straight. Order l^2.
-    eprintln!("{:?}", tip(&world, rod) / length);
-    assert!(tip(&world, rod).length() / length < 5e-3, "{:?}", tip(&world, rod));
+    // The torque acts on the last frame, half an element before the tip: second order in the element length.
+    assert!(errors[1] < 1e-4 && errors[0] / errors[1] > 2.5, "{errors:?}");
 }
 
 #[test]
@@ -92,7 +96,6 @@ fn a_twisted_clamped_rod_carries_gj_times_twist() {
     let (_, gj) = world.rod(rod).unwrap().bending_stiffness();
     let want = gj * TAU * turns / length;
     let (a, b) = (world.grip_wrench(left).unwrap().torque.x, world.grip_wrench(right).unwrap().torque.x);
-    eprintln!("{a} {b} {want} twist {}", world.rod(rod).unwrap().twist());
     assert!((b / want - 1.0).abs() < 1e-6 && (a / want + 1.0).abs() < 1e-6, "{a} {b} {want}");
 }
 
@@ -105,14 +108,10 @@ fn a_free_thread_keeps_its_length_and_falls() {
     let rod = world.insert_rod(&spec).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
     let mut worst = 0.0f64;
-    let mut newton = 0;
     for _ in 0..120 {
         let r = world.step(1.0 / 60.0);
         assert!(r.incidents.is_empty(), "{:?}", r.incidents);
         worst = worst.max(world.rod(rod).unwrap().max_elongation());
-        newton += r.newton_iterations;
     }
-    eprintln!("elongation {worst:e}, newton per frame {}", f64::from(newton) / 120.0);
     assert!(worst < 1e-5, "{worst:e}");
-    let _ = PI;
 }

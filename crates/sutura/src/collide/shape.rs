@@ -4,7 +4,6 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::shape::Geometry;
 use glam::DVec3;
-use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, Shape, TriMesh};
 
 /// A geometry ready for queries.

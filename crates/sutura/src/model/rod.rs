@@ -70,6 +70,7 @@ impl RodSpec {
     /// Equal elements on a helix about the axis `axis` (unit) through `center`, starting at `center + start` (`start` across the
     /// axis, its length is the helix radius), `turns` turns (positive is right-handed), advancing `pitch` \[m\] a turn. The rest
     /// shape is the helix itself.
+    #[allow(clippy::too_many_arguments, reason = "a helix has that many numbers")]
     pub fn helix(center: DVec3, axis: DVec3, start: DVec3, turns: f64, pitch: f64, n_elements: usize, radius: f64, material: Material) -> Self {
         let other = axis.cross(start);
         let n = n_elements.max(1);

@@ -53,7 +53,17 @@ impl Cone {
     pub fn solve(&mut self, s: &[f64], b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {
         let n = b.len();
         let m = n / 3;
-        for v in [&mut self.gradient, &mut self.direction, &mut self.image, &mut self.candidate, &mut self.center, &mut self.prox, &mut self.shifted, &mut self.best, &mut self.row] {
+        for v in [
+            &mut self.gradient,
+            &mut self.direction,
+            &mut self.image,
+            &mut self.candidate,
+            &mut self.center,
+            &mut self.prox,
+            &mut self.shifted,
+            &mut self.best,
+            &mut self.row,
+        ] {
             v.clear();
             v.resize(n, 0.0);
         }

@@ -56,10 +56,6 @@ impl Sliders {
         }
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
     fn active(&mut self) -> &mut [Slider] {
         &mut self.sliders[..self.count]
     }

@@ -6,6 +6,10 @@
 //! step that they cause. (A contact sweep that moves particles by their own inertia, m / h^2, cannot hold: the rod behind them is 10^5
 //! times stiffer.)
 //!
+//! Friction acts at the surface, with its arm on the frame, but does not turn a thread about its own axis: threads slide on each other and do
+//! not roll. (Spin has next to no inertia and, on a thread whose ends are free to turn, no stiffness: the compliance it adds to the small
+//! problem is a thousand times the rest, and the solve does not converge.)
+//!
 //! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the next substep.
 
 use crate::collide::{relative_motion, segment};
@@ -142,7 +146,7 @@ impl ThreadRow {
 }
 
 /// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's forces.
-pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
+pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { candidates, start, rows, .. } = scratch;
     rows.threads.clear();
     let old = &state.thread_contacts;
@@ -196,7 +200,6 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
     }
     merge(&mut rows.threads);
     inherit(old, &mut rows.threads);
-    let _ = h;
 }
 
 /// The last contact on the same pair of elements that is nearest in place.
@@ -255,7 +258,7 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 }
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
-pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
+pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     let Scratch { rods, rows, system, step, start, start_frame, .. } = scratch;
     if rows.threads.is_empty() {
         return;
@@ -333,7 +336,9 @@ pub(crate) fn couple(_model: &Model, state: &State, scratch: &mut Scratch) {
             for axis in 0..3 {
                 for k in 0..m {
                     let w = rows.sliders.response(k).unwrap_or(&[]);
-                    let part = |p: &Endpoint| p.here.x.col(axis).dot(w[2 * p.element]) + p.here.t.col(axis).dot(w[2 * p.element + 1]) + p.next.col(axis).dot(w[2 * p.element + 2]);
+                    let part = |p: &Endpoint| {
+                        p.here.x.col(axis).dot(w[2 * p.element]) + p.here.t.col(axis).dot(w[2 * p.element + 1]) + p.next.col(axis).dot(w[2 * p.element + 2])
+                    };
                     reach.push(part(&ends[0]) + part(&ends[1]));
                 }
             }
@@ -451,12 +456,14 @@ pub(crate) fn add_forces(scratch: &mut Scratch) {
 /// Work of the rows' forces along the step.
 pub(crate) fn work(scratch: &Scratch) -> f64 {
     let step = &scratch.step;
-    let along = |p: &Endpoint, f: DVec3| (p.here.x * f).dot(step[2 * p.element]) + (p.here.t * f).dot(step[2 * p.element + 1]) + (p.next * f).dot(step[2 * p.element + 2]);
+    let along = |p: &Endpoint, f: DVec3| {
+        (p.here.x * f).dot(step[2 * p.element]) + (p.here.t * f).dot(step[2 * p.element + 1]) + (p.next * f).dot(step[2 * p.element + 2])
+    };
     scratch.rows.threads.iter().filter(|r| r.force != DVec3::ZERO).map(|r| r.endpoints(0).iter().map(|p| along(p, r.force)).sum::<f64>()).sum()
 }
 
 /// Factor on the update so that no pair of centerlines comes nearer in one iteration than most of the way to the least distance allowed.
-pub(crate) fn limit(_model: &Model, state: &State, scratch: &Scratch, scale: f64) -> f64 {
+pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
     let x = &state.position;
     let step = &scratch.step;
     let mut scale = scale;
@@ -513,9 +520,9 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
     merge(fresh);
     let known = rows.threads.len();
     for row in fresh.iter() {
-        let same = rows.threads[..known].iter().any(|r| {
-            r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999
-        });
+        let same = rows.threads[..known]
+            .iter()
+            .any(|r| r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999);
         if !same {
             rows.threads.push(*row);
         }

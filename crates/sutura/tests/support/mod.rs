@@ -22,7 +22,6 @@ pub fn settle(world: &mut World, dt: f64, speed: f64, limit: f64) -> f64 {
         let report = world.step(dt);
         assert!(report.incidents.is_empty(), "{:?}", report.incidents);
         let fastest = world.view().rods().flat_map(|r| r.velocities().iter().map(|v| v.length())).fold(0.0, f64::max);
-        if std::env::var_os("SHOW").is_some() { eprintln!("t {:.2} fastest {fastest:e} newton {} residual {:e}", world.time(), report.newton_iterations, report.residual); }
         still = if fastest < speed { still + 1 } else { 0 };
         if still >= 10 {
             return world.time() - start;

@@ -204,6 +204,9 @@ proptest! {
     fn mangled_texts_never_panic(sample in 0..samples().len(), edits in prop::collection::vec((any::<prop::sample::Index>(), 0u8..4, any::<char>()), 1..8)) {
         let mut text: Vec<char> = samples()[sample].text.chars().collect();
         for (index, kind, c) in edits {
+            if text.is_empty() {
+                break;
+            }
             let i = index.index(text.len());
             match kind {
                 0 => { text.remove(i); }

@@ -12,7 +12,7 @@ use crate::row;
 use crate::row::pushed::Sliders;
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// Elongation to which inextensible elements are held.
 const LENGTH_TOLERANCE: f64 = 5e-6;
@@ -36,7 +36,8 @@ pub(crate) struct Outcome {
 /// Solves the substep of length `h` from `scratch.start`, carried on to `scratch.target` by its velocity; the iterate is in `state`.
 pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) -> Outcome {
     let settings = &model.settings;
-    scratch.tension.copy_from_slice(&state.tension);
+    carried_forces(model, state, scratch);
+    row::couple::begin(scratch);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails.
     let mut exact = true;
@@ -44,7 +45,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let (mut gained, mut scale) = (0.0, 1.0);
     while out.iterations < settings.newton_max {
         out.iterations += 1;
-        row::thread::zones(scratch);
+        row::shape::review(model, state, scratch, out.iterations == 1);
+        row::couple::zones(scratch);
         let first = out.iterations == 1;
         let mut taken = 1.0;
         loop {
@@ -52,7 +54,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             if !exact {
                 factor(model, state, scratch, h, Hessian::Positive, first);
             }
-            if first || taken < 0.2 {
+            if first || taken < 0.2 || !(gained > 0.0) {
                 break;
             }
             // Where the force along the last step has turned round the step went too far: contacts opened, closed or began to slide on
@@ -74,21 +76,22 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         }
         scratch.rods = blocks;
         Sliders::factor(scratch);
-        scratch.rows.sliders.couple(&mut scratch.step, true);
-        row::thread::couple(state, scratch);
+        scratch.rows.sliders.couple(&mut scratch.step, false);
+        row::couple::couple(state, scratch);
         gained = work(scratch);
         scale = limit(state, scratch);
         apply(model, state, scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
-        out.residual = out.residual.max(slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
+        out.residual = max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
         let stretched = inextensible_error(model, state);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
         }
         let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
-        if scale >= 1.0 && settled && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
+        if std::env::var("DBG").is_ok() { eprintln!("   it {} exact {exact} taken {taken:.2} scale {scale:.2} turn {:.2e} shift {:.2e} gained {gained:.2e} settled {settled} shape {} cone {} rows {} {} loaded {} {}", out.iterations, out.turn, out.residual, row::shape::settled(model, state, scratch), row::couple::solved(scratch), scratch.rows.threads.len(), scratch.rows.shapes.len(), scratch.rows.threads.iter().filter(|r| r.force.x>0.0).count(), scratch.rows.shapes.iter().filter(|r| r.normal_force>0.0).count()); }
+        if scale >= 1.0 && settled && row::couple::solved(scratch) && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
             out.converged = true;
             break;
         }
@@ -96,10 +99,23 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     out
 }
 
+/// Forces carried at the start of the substep, for the first matrix. Those of the first iterate would be far off: it is where velocity
+/// leads, and stretch and shear are so stiff that the second-order strain of a turn counts for newtons.
+fn carried_forces(model: &Model, state: &State, scratch: &mut Scratch) {
+    scratch.tension.copy_from_slice(&state.tension);
+    for (rod, _) in &scratch.rods {
+        for e in rod.start..rod.end - 1 {
+            let d = scratch.start[e + 1] - scratch.start[e];
+            let c = scratch.start_frame[e].conjugate() * d;
+            scratch.shear[e] = DVec2::new(c.x, c.y) * model.stretch_stiffness[e].truncate();
+        }
+    }
+}
+
 /// Work of the forces at the iterate, contact forces as last found, along the last step.
 fn work(scratch: &Scratch) -> f64 {
     let own: f64 = scratch.rhs.iter().zip(&scratch.step).map(|(r, z)| r.dot(*z)).sum();
-    own + row::thread::work(scratch) + scratch.rows.sliders.work()
+    own + row::couple::work(scratch) + scratch.rows.sliders.work()
 }
 
 /// Which second derivatives of the elastic energy go into the matrix. The residual is exact in either case.
@@ -173,7 +189,7 @@ fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian
             let geometric = (DMat3::IDENTITY - outer(t, t)) * (tension / l);
             let kx = kw + geometric;
             if exact {
-                let shear = (force - t * t.dot(force)) * (0.5 * l);
+                let shear = (r.x_axis * scratch.shear[e].x + r.y_axis * scratch.shear[e].y) * (0.5 * l);
                 system.diagonal[2 * e + 1] -= outer(shear, t) + outer(t, shear);
             }
             let dx = skew(d);
@@ -266,7 +282,7 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
     }
     assemble(model, state, scratch, h, Hessian::Positive);
     row::shape::assemble(model, state, scratch, h, false);
-    row::thread::add_forces(scratch);
+    row::couple::add_forces(scratch);
 }
 
 /// Factor on the update: no element turns by more than 0.3 rad in an iteration, and no pair of threads gets closer than half its gap.
@@ -279,20 +295,20 @@ fn limit(state: &State, scratch: &Scratch) -> f64 {
 /// Maximum that keeps NaN.
 #[inline]
 fn max_or_nan(a: f64, b: f64) -> f64 {
-    if b <= a { a } else { b }
+    if b <= a || a.is_nan() { a } else { b }
 }
 
 fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
         for e in rod.start..rod.end - 1 {
-            // Predicted tension: strain now plus its linear change.
+            // Predicted force: strain now plus its linear change.
             let (q, d) = (state.orientation[e], state.position[e + 1] - state.position[e]);
             let change = scratch.step[2 * e + 2] - scratch.step[2 * e] + d.cross(scratch.step[2 * e + 1]);
-            let along = q * DVec3::Z;
-            let stretch = along.dot(d) - model.rest_length[e] + scale * along.dot(change);
-            let t = stretch * model.stretch_stiffness[e].z;
-            scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + t } else { t };
+            let strain = q.conjugate() * (d + change * scale) - DVec3::new(0.0, 0.0, model.rest_length[e]);
+            let f = strain * model.stretch_stiffness[e];
+            scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + f.z } else { f.z };
+            scratch.shear[e] = DVec2::new(f.x, f.y);
         }
         for i in rod.clone() {
             state.position[i] += scratch.step[2 * i] * scale;

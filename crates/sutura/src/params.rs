@@ -64,6 +64,9 @@ impl Default for Settings {
 /// Normal stiffness of a contact over E times the radius (the scale of Hertz stiffness of two crossed cylinders).
 pub(crate) const CONTACT_STIFFNESS: f64 = 4.0;
 
+/// Normal force over E r^2 beyond which a contact with a shape that stays as it is goes into the rods' matrix.
+pub(crate) const FIRM: f64 = 1e-7;
+
 /// How far beyond the predicted motion candidates are sought, in radii.
 pub(crate) const REACH: f64 = 1.5;
 /// Overlap, in sums of radii, beyond which a substep that brought two things nearer is rejected. The bar of the sample scenes is 0.05.
@@ -87,6 +90,8 @@ pub(crate) const PARALLEL: f64 = 0.914;
 pub(crate) const RECOVER: f64 = 0.8;
 /// Residual of the contact solve, in radii.
 pub(crate) const CONTACT_TOLERANCE: f64 = 2e-3;
+/// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
+pub(crate) const CONTACT_LEFT: f64 = 0.02;
 /// Weight of the contact solve's proximal term.
 pub(crate) const PROXIMAL: f64 = 0.1;
 

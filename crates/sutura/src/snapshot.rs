@@ -175,7 +175,7 @@ variants!(LoadKind {
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
 structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
-structure!(ShapeContact { shape, element, s, normal, normal_force, friction, sliding });
+structure!(ShapeContact { shape, element, s, normal, normal_force, friction, drift, sliding });
 structure!(GripState { rod, index, hold, drive, ramp, taken_at, taken_pose, taken_velocity, taken_spin, pose, target, rest_half, half_span, force, torque });
 structure!(State {
     time,

@@ -51,6 +51,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     row::shape::begin(model, state, scratch);
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
+    if std::env::var("DBG").is_ok() { eprintln!("t {t:.6} h {h:.3e} depth {depth} {outcome:?}"); }
     let verdict = if !outcome.finite {
         Err("not finite")
     } else if !outcome.converged && depth < model.settings.halvings {

@@ -71,7 +71,12 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
     shapes.clear();
     for (slot, shape) in model.shapes.iter() {
         let (lo, hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
-        tree.overlapping(&Bounds { lo, hi }, |e| shapes.push((slot, e as u32)));
+        // A plane's box is everything: it overlaps the empty leaves as well.
+        tree.overlapping(&Bounds { lo, hi }, |e| {
+            if e < model.mass.len() && model.is_element(e) {
+                shapes.push((slot, e as u32));
+            }
+        });
     }
     shapes.sort_unstable();
     let mut list = core::mem::take(&mut candidates.threads);

@@ -1,9 +1,20 @@
 //! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`], local).
 
 pub(crate) mod cone;
+pub(crate) mod couple;
 pub(crate) mod pushed;
 pub(crate) mod shape;
 pub(crate) mod thread;
+
+use crate::math::Pose;
+use glam::{DQuat, DVec3};
+
+/// Where things were at the start of the substep.
+pub(crate) struct Start<'a> {
+    pub position: &'a [DVec3],
+    pub frame: &'a [DQuat],
+    pub shape: &'a [Pose],
+}
 
 /// The rows of one substep and the memory of their solver.
 #[derive(Default)]
@@ -11,7 +22,8 @@ pub(crate) struct Rows {
     pub shapes: Vec<shape::ShapeRow>,
     pub threads: Vec<thread::ThreadRow>,
     pub sliders: pushed::Sliders,
-    pub solver: thread::Coupling,
+    pub solver: couple::Coupling,
+    fresh: Vec<thread::ThreadRow>,
 }
 
 impl Rows {

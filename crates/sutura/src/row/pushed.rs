@@ -24,6 +24,8 @@ struct Slider {
     response: Vec<DVec3>,
     diagonal: f64,
     right: f64,
+    /// Force of the small contact problem along the direction \[N\].
+    load: f64,
     /// Move in this Newton iteration \[m\].
     step: f64,
 }
@@ -99,7 +101,7 @@ impl Sliders {
             for (rod, zone) in rods.iter() {
                 system.solve(rod.clone(), zone, &mut s.response);
             }
-            s.step = 0.0;
+            (s.step, s.load) = (0.0, 0.0);
         }
         sliders.schur.clear();
         for i in 0..n {
@@ -110,15 +112,30 @@ impl Sliders {
         }
     }
 
-    /// Couples a solution `z` of the rods alone with the sliders. `loaded`: with the sliders' own right side.
-    pub fn couple(&mut self, z: &mut [DVec3], loaded: bool) {
+    /// The number of a shape that is pushed.
+    pub fn find(&self, shape: u32) -> Option<usize> {
+        self.sliders[..self.count].iter().position(|s| s.shape == shape)
+    }
+    pub fn direction(&self, k: usize) -> DVec3 {
+        self.sliders[k].direction
+    }
+    /// Move in this Newton iteration so far \[m\].
+    pub fn step(&self, k: usize) -> f64 {
+        self.sliders[k].step
+    }
+    pub fn load(&mut self, k: usize, force: f64) {
+        self.sliders[k].load += force;
+    }
+
+    /// Couples a solution `z` of the rods alone with the sliders under their own forces, or under those of the small contact problem.
+    pub fn couple(&mut self, z: &mut [DVec3], contacts: bool) {
         let n = self.count;
         if n == 0 {
             return;
         }
         self.small.clear();
         for s in &self.sliders[..n] {
-            self.small.push(if loaded { s.right } else { 0.0 } - inner(&s.border, z));
+            self.small.push(if contacts { s.load } else { s.right } - inner(&s.border, z));
         }
         self.dense.clone_from(&self.schur);
         if !solve_dense(&mut self.dense, &mut self.small, n) {
@@ -134,12 +151,15 @@ impl Sliders {
 
     /// Work of the forces on the shapes along their step.
     pub fn work(&self) -> f64 {
-        self.sliders[..self.count].iter().map(|s| s.right * s.step).sum()
+        self.sliders[..self.count].iter().map(|s| (s.right + s.load) * s.step).sum()
     }
 
-    /// Number of sliders, and the response of the rods to slider `k`.
-    pub fn response(&self, k: usize) -> Option<&[DVec3]> {
-        (k < self.count).then(|| self.sliders[k].response.as_slice())
+    pub fn count(&self) -> usize {
+        self.count
+    }
+    /// Response of the rods to slider `k`.
+    pub fn response(&self, k: usize) -> &[DVec3] {
+        &self.sliders[k].response
     }
 
     /// `schur^-1 v` for a vector over the sliders.

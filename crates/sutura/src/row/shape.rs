@@ -1,25 +1,28 @@
-//! Contact of thread with shapes. A shape has no compliance of its own, so each contact touches one rod at one place and goes straight
-//! into that rod's matrix: cost is linear in the number of contacts.
+//! Contact of thread with shapes: normal force `k gap^2` for gap < 0, gap = signed distance of the centerline point less r (and less a
+//! fiftieth of the diameter, kept in reserve for the chords between particles), with Coulomb friction. It stiffens as Hertz contact does; k is
+//! such that a force of `E r^2 / 1000` leaves a gap of -r / 100.
 //!
-//! Normal: force `k gap^2` for gap < 0, gap = signed distance of the centerline point less r (and less a
-//! fiftieth of the diameter, kept in reserve for the chords between particles). It starts with zero slope, so that a thread that
-//! lies lightly on a shape does not rattle between touching and not, and stiffens as Hertz contact does; k is such that a force of
-//! `E r^2 / 1000` leaves a gap of -r / 100.
-//! Friction: Coulomb with a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one
-//! is at its load: while the trial force `f0 - stiffness * slip` is within mu times the normal force it sticks, and does not creep; beyond,
-//! the force stays on the disc.
-//! The tangential force acts at the surface, with its arm on the frame; the normal force at the centerline.
-//! A contact that begins to slide enters with its secant stiffness, limit over trial length, in every tangential direction: with none
-//! along the slip (the tangent) a light thread spun by friction overshoots from slip to counter-slip for ever. Once a contact slides along
-//! its thread in the same direction in two iterations the tangent is taken; across the thread, where it may roll, never.
-//! The dependence of the disc on the normal force is left out of the matrix (it would be unsymmetric); iteration closes it.
+//! A row that bore a firm load and keeps its state is a spring in the rods' own matrix: cost is linear in the number of such rows. All others
+//! (light ones, those that touch, lift off, begin to slide or to stick) enter the small contact problem ([`couple`]), which decides all of
+//! them at once; Newton alone would switch them on and off from one iteration to the next.
+//!
+//! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
+//! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. It acts at the
+//! surface, with its arm on the frame, but does not turn a thread about its own direction; the normal force acts at the centerline.
+//! A firm row that slides enters with its secant stiffness, limit over trial length, in every tangential direction; once it slides along
+//! its thread in the same direction in two iterations with none along it (the tangent).
+//!
+//! [`couple`]: crate::row::couple
 
 use crate::math::{Pose, log, outer, skew};
 use crate::model::Model;
 use crate::params;
+use crate::row::Start;
+use crate::row::couple::{Endpoint, Entry, Source};
+use crate::row::pushed::Sliders;
 use crate::scratch::Scratch;
 use crate::state::{ShapeContact, State};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 
 /// A place on a thread that may touch a shape in this substep.
 #[derive(Debug, Clone, Copy)]
@@ -33,17 +36,61 @@ pub(crate) struct ShapeRow {
     stiffness: f64,
     /// Friction coefficients sticking and sliding.
     mu: [f64; 2],
+    /// Least normal force of a firm row \[N\].
+    least: f64,
+    /// In the rods' matrix, not in the small problem.
+    firm: bool,
+    /// Whether it slid in the last substep, and at the last look.
+    slid_before: bool,
     sliding: bool,
-    /// Friction force at the start of the substep, in the tangent plane then.
+    /// Friction force at the start of the substep, in the tangent plane then, and slip that was still to be undone.
     anchor: DVec3,
-    /// Outward direction of the surface at the last look.
+    drift: DVec3,
+    /// Compliance with which it last entered the small problem \[m/N\].
+    entered: f64,
+    /// Direction of the thread.
+    along: DVec3,
+    /// Outward direction of the surface and gap at the last look.
     normal: DVec3,
     gap: f64,
-    /// Force on the thread at the last look.
-    normal_force: f64,
+    /// Gap at the start.
+    start_gap: f64,
+    /// Normal force at the start.
+    carried: f64,
+    /// Force on the thread at the last look (firm) or of the last solution.
+    pub normal_force: f64,
     friction: DVec3,
     /// Direction of the friction force in the iteration before, when it slid.
     slid: DVec3,
+}
+
+/// Normal force over E times the gap squared.
+const HARDNESS: f64 = 10.0;
+
+impl ShapeRow {
+    /// Its element, when it may enter the small problem.
+    pub fn entering(&self) -> Option<usize> {
+        (!self.firm).then_some(self.element as usize)
+    }
+
+    /// Normal and two tangents.
+    fn axes(&self) -> [DVec3; 3] {
+        let n = self.normal;
+        let t1 = (self.along - n * n.dot(self.along)).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
+        [n, t1, n.cross(t1)]
+    }
+
+    /// Compliance with which it enters the small problem: gap over force at the last force, which a light contact is taken to have at least.
+    fn compliance(&self) -> f64 {
+        1.0 / (self.hardness * self.normal_force.max(self.least)).sqrt()
+    }
+
+    /// Takes the small problem's force.
+    pub fn solved(&mut self, force: DVec3) {
+        let [_, t1, t2] = self.axes();
+        self.normal_force = force.x;
+        self.friction = t1 * force.y + t2 * force.z;
+    }
 }
 
 /// Collects the rows of the substep.
@@ -89,21 +136,31 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
             if now.value.min(before.value) > reach {
                 return;
             }
-            let anchor = known.map_or(DVec3::ZERO, |c| c.friction - normal * normal.dot(c.friction));
+            let across = |v: DVec3| v - normal * normal.dot(v);
+            let gap = before.value - rod.radius * (1.0 + 2.0 * params::KEEP);
+            let normal_force = known.map_or(0.0, |c| c.normal_force);
             rows.shapes.push(ShapeRow {
                 shape: *slot,
                 element: e as u32,
                 s,
                 radius: rod.radius,
-                hardness: 10.0 * rod.material.young_modulus,
+                hardness: HARDNESS * rod.material.young_modulus,
                 stiffness: 0.0,
+                least: params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
                 mu: [friction.stick, friction.slide],
+                firm: normal_force > params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
+                slid_before: known.is_some_and(|c| c.sliding),
                 sliding: known.is_some_and(|c| c.sliding),
-                anchor,
+                anchor: known.map_or(DVec3::ZERO, |c| across(c.friction)),
+                drift: known.map_or(DVec3::ZERO, |c| across(c.drift)),
+                entered: 0.0,
+                along: (start[e + 1] - start[e]).normalize_or_zero(),
                 normal,
-                gap: before.value - rod.radius * (1.0 + 2.0 * params::KEEP),
-                normal_force: known.map_or(0.0, |c| c.normal_force),
-                friction: DVec3::ZERO,
+                gap,
+                start_gap: gap,
+                carried: normal_force,
+                normal_force,
+                friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
                 slid: DVec3::ZERO,
             });
         };
@@ -123,14 +180,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     }
 }
 
-/// Where things were at the start of the substep.
-struct Start<'a> {
-    position: &'a [DVec3],
-    frame: &'a [DQuat],
-    shape: &'a [Pose],
-}
-
-/// Looks where the row is now.
+/// Looks where the row is now; its point on the centerline.
 fn look(model: &Model, state: &State, row: &mut ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let shape = model.shapes.at(row.shape).expect("rows name living shapes");
@@ -141,66 +191,88 @@ fn look(model: &Model, state: &State, row: &mut ShapeRow) -> DVec3 {
     p
 }
 
-/// Forces of a row at the iterate, and their stiffness against moves of the surface point. `None` when it carries none. In the first
-/// iteration a row that carried force is linearized where it carried it: Newton starts where velocity leads, which may be just off the
-/// surface.
-fn forces(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> Option<DMat3> {
-    let p = look(model, state, row);
-    let (e, n) = (row.element as usize, row.normal);
-    let mut depth = (-row.gap).max(0.0);
-    row.stiffness = 2.0 * row.hardness * depth;
-    if first && row.normal_force > row.hardness * depth * depth {
-        depth = (row.normal_force / row.hardness).sqrt();
-        row.stiffness = 2.0 * row.hardness * depth;
-        row.normal_force += row.stiffness * (-row.gap - depth);
-    } else {
-        row.normal_force = row.hardness * depth * depth;
-    }
-    if depth == 0.0 {
-        row.friction = DVec3::ZERO;
-        return None;
-    }
-    let k = row.stiffness;
+/// Slip of the thread's surface against the shape's since the start of the substep, with what was still to be undone then.
+fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
+    let e = row.element as usize;
+    let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
     let arm = n * -row.radius;
     let turned = log(state.orientation[e] * start.frame[e].conjugate());
+    let turned = turned - row.along * row.along.dot(turned);
     let carried = surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p + arm);
-    let moved = p - start.position[e].lerp(start.position[e + 1], row.s) + turned.cross(arm) - carried;
-    let tangential = |v: DVec3| v - n * n.dot(v);
-    let trial = tangential(row.anchor) - tangential(moved) * k;
-    let limit = row.mu[usize::from(row.sliding)] * row.normal_force.max(0.0);
+    let slip = p - start.position[e].lerp(start.position[e + 1], row.s) + turned.cross(arm) - carried + row.drift;
+    slip - n * n.dot(slip)
+}
+
+/// Forces of a firm row at the iterate, and their stiffness against moves of the surface point. In the first iteration the row is linearized
+/// where it carried its force: Newton starts where velocity leads, which may be just off the surface.
+fn forces(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DMat3 {
+    look(model, state, row);
+    let n = row.normal;
+    let depth = (-row.gap).max(0.0);
+    let touching = row.hardness * depth * depth;
+    let pressed = if first && row.carried > touching {
+        let carried = (row.carried / row.hardness).sqrt();
+        row.stiffness = 2.0 * row.hardness * carried;
+        row.normal_force = row.carried + row.stiffness * (-row.gap - carried);
+        row.carried
+    } else {
+        row.stiffness = 2.0 * row.hardness * depth;
+        row.normal_force = touching;
+        touching
+    };
+    let k = row.stiffness;
+    let trial = row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * k;
+    let limit = row.mu[usize::from(row.slid_before)] * pressed;
     let size = trial.length();
     if size <= limit {
         row.slid = DVec3::ZERO;
         row.sliding = false;
         row.friction = trial;
-        return Some(DMat3::from_diagonal(DVec3::splat(k)));
+        return DMat3::from_diagonal(DVec3::splat(k));
     }
     row.sliding = true;
-    let limit = row.mu[1] * row.normal_force.max(0.0);
+    let limit = row.mu[1] * pressed;
     let direction = trial / size;
     row.friction = direction * limit;
     let secant = (DMat3::IDENTITY - outer(n, n)) * (k * limit / size);
-    let along = (state.position[e + 1] - state.position[e]).normalize_or_zero();
-    let steady = row.slid.dot(direction) > 0.95 && direction.dot(along).abs() > 0.95;
+    let steady = row.slid.dot(direction) > 0.95 && direction.dot(row.along).abs() > 0.95;
     row.slid = direction;
-    Some(outer(n, n) * k + if steady { secant - outer(direction, direction) * (k * limit / size) } else { secant })
+    outer(n, n) * k + if steady { secant - outer(direction, direction) * (k * limit / size) } else { secant }
 }
 
-/// Adds forces and stiffness of the rows at the iterate.
+/// Takes rows that change their state out of the rods' matrix.
+pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
+    let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
+    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    for row in rows.shapes.iter_mut().filter(|r| r.firm) {
+        let before = *row;
+        forces(model, state, &start, row, first);
+        if row.normal_force <= 0.0 && !first {
+            *row = ShapeRow { firm: false, ..before };
+        }
+    }
+}
+
+/// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, first: bool) {
     let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
     rows.sliders.clear(model, state, start_shape_pose, h);
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in &mut rows.shapes {
-        let Some(stiffness) = forces(model, state, &start, row, first) else { continue };
+        if !row.firm {
+            look(model, state, row);
+            continue;
+        }
+        let stiffness = forces(model, state, &start, row, first);
         let e = row.element as usize;
         let arm = row.normal * -row.radius;
         let (a, b) = (1.0 - row.s, row.s);
         let force = row.normal * row.normal_force + row.friction;
         rhs[2 * e] += force * a;
         rhs[2 * e + 2] += force * b;
-        rhs[2 * e + 1] += arm.cross(row.friction);
-        let turn = skew(arm) * -1.0;
+        let across = DMat3::IDENTITY - outer(row.along, row.along);
+        rhs[2 * e + 1] += across * arm.cross(row.friction);
+        let turn = skew(-arm) * across;
         let kt = stiffness * turn;
         system.diagonal[2 * e] += stiffness * (a * a);
         system.diagonal[2 * e + 2] += stiffness * (b * b);
@@ -212,6 +284,44 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
     }
 }
 
+/// Adds the rows that may act to the small problem.
+pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ShapeRow], sliders: &Sliders, entries: &mut Vec<Entry>) {
+    for (k, row) in rows.iter_mut().enumerate().filter(|(_, r)| !r.firm) {
+        let e = row.element as usize;
+        let slider = sliders.find(row.shape);
+        let pushed = slider.map_or(DVec3::ZERO, |j| sliders.direction(j) * sliders.step(j));
+        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - pushed;
+        let gap = row.gap + row.normal.dot(moved);
+        if row.normal_force <= 0.0 && gap.min(row.gap) > params::PRUNE * row.radius {
+            (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
+            continue;
+        }
+        row.entered = row.compliance();
+        let axes = row.axes();
+        let [n, t1, t2] = axes;
+        let arm = n * -row.radius;
+        let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
+        let slip = slip(state, start, row) + moved + turned.cross(arm) - row.anchor * row.entered;
+        // An overlap from before is pushed out over a few substeps.
+        let allowed = if row.start_gap < 0.0 { row.start_gap * params::RECOVER } else { 0.0 };
+        let end = Endpoint::new(e, row.s, axes, arm, row.along);
+        entries.push(Entry {
+            source: Source::Shape(k as u32),
+            ends: [end, end],
+            two: false,
+            slider: slider.map(|j| {
+                let d = -sliders.direction(j);
+                (j, DVec3::new(d.dot(n), d.dot(t1), d.dot(t2)))
+            }),
+            free: DVec3::new(gap - allowed, slip.dot(t1), slip.dot(t2)),
+            mu: row.mu[usize::from(row.slid_before)],
+            compliance: row.entered,
+            radius: row.radius,
+            force: DVec3::new(row.normal_force, row.friction.dot(t1), row.friction.dot(t2)),
+        });
+    }
+}
+
 /// How far a shape's material point now at `point` has come since the start of the substep.
 fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
     if from == to { DVec3::ZERO } else { point - from.transform_point(to.inverse_transform_point(point)) }
@@ -219,17 +329,20 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 
 /// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization.
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
-    let rows = &mut scratch.rows.shapes;
-    let largest = rows.iter().map(|r| r.normal_force).fold(0.0, f64::max);
-    rows.iter_mut().all(|row| {
-        let (gap, normal) = (row.gap, row.normal);
-        look(model, state, row);
-        let predicted = (row.normal_force - row.stiffness * (row.gap - gap)).max(0.0);
-        let now = row.hardness * (-row.gap).max(0.0).powi(2);
-        (row.gap, row.normal) = (gap, normal);
-        // Forces under a millionth of E r^2 do not move a thread.
-        let floor = 1e-7 * row.hardness * row.radius * row.radius;
-        (now - predicted).abs() <= 0.02 * largest + floor
+    let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
+    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let largest = rows.shapes.iter().map(|r| r.normal_force).fold(0.0, f64::max);
+    rows.shapes.iter().all(|row| {
+        let mut now = *row;
+        if row.firm {
+            forces(model, state, &start, &mut now, false);
+            let predicted = row.normal_force - row.stiffness * (now.gap - row.gap);
+            // A row that was to stick and would slide has kept what it holds from starting.
+            (now.normal_force - predicted.max(0.0)).abs() <= 0.02 * largest && (row.sliding || !now.sliding)
+        } else {
+            look(model, state, &mut now);
+            row.normal_force > 0.0 || now.gap > row.start_gap.min(0.0) - params::SLACK * row.radius
+        }
     })
 }
 
@@ -240,7 +353,16 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
     let mut contacts = core::mem::take(&mut state.shape_contacts);
     contacts.clear();
     for row in &mut rows.shapes {
-        if forces(model, state, &start, row, false).is_some() {
+        let drift = if row.firm {
+            forces(model, state, &start, row, false);
+            DVec3::ZERO
+        } else {
+            look(model, state, row);
+            row.sliding = row.friction.length() >= 0.9999 * row.mu[usize::from(row.slid_before)] * row.normal_force;
+            let left = if row.sliding { DVec3::ZERO } else { slip(state, &start, row) + (row.friction - row.anchor) * row.entered };
+            left.clamp_length_max(0.1 * row.radius)
+        };
+        if row.normal_force > 0.0 {
             contacts.push(ShapeContact {
                 shape: row.shape,
                 element: row.element,
@@ -248,6 +370,7 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
                 normal: row.normal,
                 normal_force: row.normal_force,
                 friction: row.friction,
+                drift,
                 sliding: row.sliding,
             });
         }

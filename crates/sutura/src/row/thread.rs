@@ -16,11 +16,11 @@ use crate::collide::{relative_motion, segment};
 use crate::math::log;
 use crate::model::Model;
 use crate::params;
-use crate::rod::factor::{Block, Columns};
-use crate::row::cone::{Cone, Limits};
+use crate::row::Start;
+use crate::row::couple::{Endpoint, Entry, Source};
 use crate::scratch::Scratch;
 use crate::state::{State, ThreadContact};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// Two places of thread that may not come nearer than `sum` along `normal`.
 #[derive(Debug, Clone, Copy)]
@@ -44,39 +44,9 @@ pub(crate) struct ThreadRow {
     anchor: DVec3,
     drift: DVec3,
     /// Force on a along the axes \[N\].
-    force: DVec3,
+    pub force: DVec3,
     /// Clearance already missing at the start: it is won back over a few substeps, not at once.
     start_gap: f64,
-}
-
-/// One side of a row: its element, its sign and its Jacobian as right-side columns on blocks `element` and `element + 1`.
-#[derive(Debug, Clone, Copy)]
-struct Endpoint {
-    element: usize,
-    row: u32,
-    /// Columns on (x, theta) of block `element`, and on x of the next.
-    here: Columns,
-    next: DMat3,
-}
-
-/// Memory of the coupling.
-#[derive(Default)]
-pub(crate) struct Coupling {
-    active: Vec<u32>,
-    endpoints: Vec<Endpoint>,
-    /// Zone blocks that endpoints touch, ascending, and the transfer from each to the one before it.
-    blocks: Vec<usize>,
-    jumps: Vec<Block>,
-    s: Vec<f64>,
-    b: Vec<f64>,
-    mu: Vec<f64>,
-    force: Vec<f64>,
-    cone: Cone,
-    right: Vec<DVec3>,
-    /// Response of each row to the pushed shapes.
-    reach: Vec<f64>,
-    small: Vec<f64>,
-    fresh: Vec<ThreadRow>,
 }
 
 impl ThreadRow {
@@ -110,29 +80,28 @@ impl ThreadRow {
     }
 
     /// Slip of the two surfaces against each other since the start of the substep, linear in the rotations, as a vector.
-    fn slip(&self, state: &State, scratch_start: &[DVec3], start_frame: &[glam::DQuat]) -> DVec3 {
+    fn slip(&self, state: &State, start: &Start<'_>) -> DVec3 {
         let turned = |e: usize, k: usize| {
-            let turn = log(state.orientation[e] * start_frame[e].conjugate());
+            let turn = log(state.orientation[e] * start.frame[e].conjugate());
             turn - self.along[k] * self.along[k].dot(turn)
         };
         let n = self.axes[0];
-        let moved = self.apart(&state.position) - self.apart(scratch_start);
+        let moved = self.apart(&state.position) - self.apart(start.position);
         let spin = turned(self.a, 0).cross(n * -self.radii[0]) - turned(self.b, 1).cross(n * self.radii[1]);
         let slip = moved + spin;
         slip - n * n.dot(slip)
     }
 
-    fn endpoints(&self, row: u32) -> [Endpoint; 2] {
-        let side = |element: usize, s: f64, sign: f64, arm: DVec3, along: DVec3| {
-            let [n, t1, t2] = self.axes;
-            let axes = DMat3::from_cols(n, t1, t2) * sign;
-            // The normal force acts at the centerline, friction at the surface.
-            let across = |v: DVec3| v - along * along.dot(v);
-            let turn = DMat3::from_cols(DVec3::ZERO, across(arm.cross(t1)), across(arm.cross(t2))) * sign;
-            Endpoint { element, row, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
-        };
-        let n = self.axes[0];
-        [side(self.a, self.s, 1.0, n * -self.radii[0], self.along[0]), side(self.b, self.t, -1.0, n * self.radii[1], self.along[1])]
+    fn endpoints(&self) -> [Endpoint; 2] {
+        let [n, t1, t2] = self.axes;
+        [
+            Endpoint::new(self.a, self.s, self.axes, n * -self.radii[0], self.along[0]),
+            Endpoint::new(self.b, self.t, [-n, -t1, -t2], n * self.radii[1], self.along[1]),
+        ]
+    }
+
+    pub fn elements(&self) -> [usize; 2] {
+        [self.a, self.b]
     }
 
     fn key(&self) -> (usize, usize) {
@@ -212,7 +181,7 @@ fn nearest_known(old: &[ThreadContact], a: usize, b: usize, s: f64, t: f64) -> O
 /// Leaves one of rows at the same two places (neighboring elements share a particle). Only those: a row between neighbors guards
 /// what its neighbor does not.
 fn merge(rows: &mut Vec<ThreadRow>) {
-    rows.sort_by(|x, y| x.place().partial_cmp(&y.place()).expect("places are finite"));
+    rows.sort_unstable_by(|x, y| x.place().0.total_cmp(&y.place().0).then(x.place().1.total_cmp(&y.place().1)));
     rows.dedup_by(|x, y| {
         let (p, q) = (x.place(), y.place());
         (p.0 - q.0).abs() < 1e-6 && (p.1 - q.1).abs() < 1e-6
@@ -244,222 +213,37 @@ fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
     }
 }
 
-/// Sets the zone of each rod: from the first to the last block that a row touches.
-pub(crate) fn zones(scratch: &mut Scratch) {
-    let Scratch { rods, rows, .. } = scratch;
-    for (blocks, zone) in rods.iter_mut() {
-        let (mut lo, mut hi) = (usize::MAX, 0);
-        for e in rows.threads.iter().flat_map(|r| [r.a, r.b]).filter(|e| blocks.contains(e)) {
-            lo = lo.min(e);
-            hi = hi.max(e + 1);
-        }
-        *zone = if lo == usize::MAX { blocks.end - 1..blocks.end } else { lo..hi + 1 };
-    }
-}
-
-/// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
-pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let Scratch { rods, rows, system, step, start, start_frame, .. } = scratch;
-    if rows.threads.is_empty() {
-        return;
-    }
-    let Coupling { active, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, .. } = &mut rows.solver;
-    active.clear();
-    b.clear();
-    mu.clear();
-    force.clear();
-    let mut smallest = f64::INFINITY;
-    for (k, row) in rows.threads.iter_mut().enumerate() {
+/// Adds the rows that may act to the small problem.
+pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ThreadRow], entries: &mut Vec<Entry>) {
+    for (k, row) in rows.iter_mut().enumerate() {
         // Where the step without contact forces would leave the row.
         let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
         let moved = d(row.a, row.s) - d(row.b, row.t);
         let n = row.axes[0];
-        let gap = n.dot(row.apart(&state.position)) - row.sum + n.dot(moved);
-        let r = row.radii[0].min(row.radii[1]);
-        if row.force.x <= 0.0 && gap > params::PRUNE * r {
+        let now = n.dot(row.apart(&state.position)) - row.sum;
+        let gap = now + n.dot(moved);
+        if row.force.x <= 0.0 && gap.min(now) > params::PRUNE * row.radii[0].min(row.radii[1]) {
             row.force = DVec3::ZERO;
             continue;
         }
-        smallest = smallest.min(r);
         let turn = |e: usize, k: usize| step[2 * e + 1] - row.along[k] * row.along[k].dot(step[2 * e + 1]);
         let spin = turn(row.a, 0).cross(n * -row.radii[0]) - turn(row.b, 1).cross(n * row.radii[1]);
-        let slip = row.slip(state, start, start_frame) + moved + spin + row.drift - row.anchor * row.compliance;
-        active.push(k as u32);
+        let slip = row.slip(state, start) + moved + spin + row.drift - row.anchor * row.compliance;
         // An overlap from before is pushed out over a few substeps.
         let allowed = if row.start_gap < 0.0 { row.start_gap * params::RECOVER } else { 0.0 };
-        b.extend([gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])]);
-        mu.push(row.mu[usize::from(row.sliding)]);
-        force.extend(row.force.to_array());
+        let [a, b] = row.endpoints();
+        entries.push(Entry {
+            source: Source::Thread(k as u32),
+            ends: [a, b],
+            two: true,
+            slider: None,
+            free: DVec3::new(gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])),
+            mu: row.mu[usize::from(row.sliding)],
+            compliance: row.compliance,
+            radius: row.radii[0].min(row.radii[1]),
+            force: row.force,
+        });
     }
-    let n = b.len();
-    if n == 0 {
-        return;
-    }
-    s.clear();
-    s.resize(n * n, 0.0);
-    for (_, zone) in rods.iter() {
-        endpoints.clear();
-        for (k, index) in active.iter().enumerate() {
-            endpoints.extend(rows.threads[*index as usize].endpoints(k as u32).into_iter().filter(|p| zone.contains(&p.element) && p.element + 1 < zone.end));
-        }
-        if endpoints.is_empty() {
-            continue;
-        }
-        endpoints.sort_by_key(|p| (p.element, p.row));
-        system.invert_zone(zone);
-        blocks.clear();
-        for p in endpoints.iter() {
-            for k in [p.element, p.element + 1] {
-                if blocks.last().is_none_or(|l| *l < k) {
-                    blocks.push(k);
-                }
-            }
-        }
-        // Transfer from each touched block up to the one before it.
-        jumps.clear();
-        jumps.push(Block::default());
-        for pair in blocks.windows(2) {
-            let mut jump = system.transfer(pair[1] - 1).negated();
-            for k in (pair[0]..pair[1] - 1).rev() {
-                jump = system.transfer(k).negated().mul(&jump);
-            }
-            jumps.push(jump);
-        }
-        compliance_between(system, endpoints, blocks, jumps, s, n);
-    }
-    // What gives way with the pushed shapes: W grows by H^-1 B schur^-1 B^T H^-1.
-    let m = (0..).take_while(|k| rows.sliders.response(*k).is_some()).count();
-    if m > 0 {
-        reach.clear();
-        for index in active.iter() {
-            let ends = rows.threads[*index as usize].endpoints(0);
-            for axis in 0..3 {
-                for k in 0..m {
-                    let w = rows.sliders.response(k).unwrap_or(&[]);
-                    let part = |p: &Endpoint| {
-                        p.here.x.col(axis).dot(w[2 * p.element]) + p.here.t.col(axis).dot(w[2 * p.element + 1]) + p.next.col(axis).dot(w[2 * p.element + 2])
-                    };
-                    reach.push(part(&ends[0]) + part(&ends[1]));
-                }
-            }
-        }
-        for i in 0..n {
-            small.clear();
-            small.extend_from_slice(&reach[i * m..(i + 1) * m]);
-            rows.sliders.solve_small(small);
-            for j in i..n {
-                s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
-            }
-        }
-    }
-    for k in 0..active.len() {
-        let c = rows.threads[active[k] as usize].compliance;
-        for i in 3 * k..3 * k + 3 {
-            s[i * n + i] += c;
-            for j in 0..i {
-                s[i * n + j] = s[j * n + i];
-            }
-        }
-    }
-    let limits = Limits {
-        inner: params::CONTACT_TOLERANCE * smallest,
-        outer: 2.0 * params::CONTACT_TOLERANCE * smallest,
-        max_inner: 20,
-        max_outer: 6,
-        proximal: params::PROXIMAL,
-    };
-    cone.solve(s, b, mu, force, &limits);
-    right.clear();
-    right.resize(step.len(), DVec3::ZERO);
-    for (k, index) in active.iter().enumerate() {
-        let row = &mut rows.threads[*index as usize];
-        row.force = DVec3::new(force[3 * k], force[3 * k + 1], force[3 * k + 2]);
-        for p in row.endpoints(0) {
-            right[2 * p.element] += p.here.x * row.force;
-            right[2 * p.element + 1] += p.here.t * row.force;
-            right[2 * p.element + 2] += p.next * row.force;
-        }
-    }
-    for (node, r) in right.iter_mut().enumerate() {
-        if scratch.freedom[node] != crate::scratch::Freedom::Free {
-            *r = scratch.freedom[node].projector() * *r;
-        }
-    }
-    for (rod, zone) in rods.iter() {
-        system.solve(rod.clone(), zone, right);
-    }
-    rows.sliders.couple(right, false);
-    for (z, r) in step.iter_mut().zip(right.iter()) {
-        *z += *r;
-    }
-}
-
-/// Adds `G W G^T` over the endpoints of one rod to the upper triangle of `s`.
-fn compliance_between(system: &crate::rod::factor::System, endpoints: &[Endpoint], blocks: &[usize], jumps: &[Block], s: &mut [f64], n: usize) {
-    for (qi, q) in endpoints.iter().enumerate() {
-        // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
-        let e = q.element;
-        let (x_here, x_next, k) = (system.inverse(e), system.inverse(e + 1), system.transfer(e));
-        let kt = k.transpose().mul_columns(&q.here);
-        let pushed = Columns { x: q.next - kt.x, t: -kt.t };
-        let mut next = x_next.mul_columns(&pushed);
-        let direct = x_next.mul_columns(&Columns { x: q.next, t: DMat3::ZERO });
-        let up = k.mul_columns(&direct);
-        let own = x_here.mul_columns(&q.here);
-        let mut here = Columns { x: own.x - up.x, t: own.t - up.t };
-        let mut at = blocks.partition_point(|b| *b < e);
-        let mut pi = qi + 1;
-        // Endpoints on the same element after q are handled when they are q.
-        while pi > 0 {
-            pi -= 1;
-            let p = &endpoints[pi];
-            while blocks[at] > p.element {
-                at -= 1;
-                next = here;
-                here = jumps[at + 1].mul_columns(&here);
-            }
-            let value = p.here.x.transpose() * here.x + p.here.t.transpose() * here.t + p.next.transpose() * next.x;
-            let (r, c) = (3 * p.row as usize, 3 * q.row as usize);
-            for j in 0..3 {
-                for i in 0..3 {
-                    let v = value.col(j)[i];
-                    if r < c {
-                        s[(r + i) * n + c + j] += v;
-                    } else if r > c {
-                        s[(c + j) * n + r + i] += v;
-                    } else {
-                        // Both sides of one row on one rod: count the pair and its mirror image.
-                        let twice = pi != qi;
-                        s[(r + i) * n + c + j] += v;
-                        if twice {
-                            s[(r + j) * n + c + i] += v;
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Adds the rows' forces to `scratch.rhs`.
-pub(crate) fn add_forces(scratch: &mut Scratch) {
-    let Scratch { rows, rhs, .. } = scratch;
-    for row in &rows.threads {
-        for p in row.endpoints(0) {
-            rhs[2 * p.element] += p.here.x * row.force;
-            rhs[2 * p.element + 1] += p.here.t * row.force;
-            rhs[2 * p.element + 2] += p.next * row.force;
-        }
-    }
-}
-
-/// Work of the rows' forces along the step.
-pub(crate) fn work(scratch: &Scratch) -> f64 {
-    let step = &scratch.step;
-    let along = |p: &Endpoint, f: DVec3| {
-        (p.here.x * f).dot(step[2 * p.element]) + (p.here.t * f).dot(step[2 * p.element + 1]) + (p.next * f).dot(step[2 * p.element + 2])
-    };
-    scratch.rows.threads.iter().filter(|r| r.force != DVec3::ZERO).map(|r| r.endpoints(0).iter().map(|p| along(p, r.force)).sum::<f64>()).sum()
 }
 
 /// Factor on the update so that no pair of centerlines comes nearer in one iteration than most of the way to the least distance allowed.
@@ -490,7 +274,7 @@ pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
 pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { candidates, start, rows, .. } = scratch;
     let x = &state.position;
-    let fresh = &mut rows.solver.fresh;
+    let fresh = &mut rows.fresh;
     fresh.clear();
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
@@ -532,6 +316,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
 
 /// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left undone.
 pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
+    let start = Start { position: &scratch.start, frame: &scratch.start_frame, shape: &scratch.start_shape_pose };
     let mut contacts = core::mem::take(&mut state.thread_contacts);
     contacts.clear();
     for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {
@@ -541,7 +326,7 @@ pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
         let drift = if sliding {
             DVec3::ZERO
         } else {
-            let slip = row.slip(state, &scratch.start, &scratch.start_frame);
+            let slip = row.slip(state, &start);
             (row.drift + slip + (friction - row.anchor) * row.compliance).clamp_length_max(0.1 * row.radii[0])
         };
         contacts.push(ThreadContact {
@@ -556,6 +341,6 @@ pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
             sliding,
         });
     }
-    contacts.sort_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
+    contacts.sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
     state.thread_contacts = contacts;
 }

@@ -98,6 +98,8 @@ pub(crate) struct ShapeContact {
     pub normal: DVec3,
     pub normal_force: f64,
     pub friction: DVec3,
+    /// Slip that the friction spring has still to undo \[m\].
+    pub drift: DVec3,
     /// Whether it slid.
     pub sliding: bool,
 }

@@ -1,0 +1,318 @@
+//! The small contact problem: its assembly in the rods' compliance and what its solution does.
+//!
+//! Each [`Entry`] is one contact. With W the inverse of the rods' Newton matrix and G the Jacobian of the contacts, `S = G W G^T` is the
+//! compliance between contacts. Newton's step without contact gives the right side, the contact forces follow from S ([`cone`]), and then
+//! the step that they cause. (A contact sweep that moves particles by their own inertia, m / h^2, cannot hold: the rod behind them is 10^5
+//! times stiffer.)
+//!
+//! [`cone`]: crate::row::cone
+
+use crate::params;
+use crate::rod::factor::{Block, Columns, System};
+use crate::row::cone::{Cone, Limits};
+use crate::row::{Start, shape, thread};
+use crate::scratch::{Freedom, Scratch};
+use crate::state::State;
+use glam::{DMat3, DVec3};
+
+/// The row that an entry stands for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Source {
+    Thread(u32),
+    Shape(u32),
+}
+
+/// A thread's side of a contact: its Jacobian as right-side columns (normal, two tangents) on blocks `element` and `element + 1`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Endpoint {
+    pub element: usize,
+    /// Columns on (x, theta) of block `element`, and on x of the next.
+    pub here: Columns,
+    pub next: DMat3,
+}
+
+impl Endpoint {
+    /// The place `s` on `element`, pushed along `axes`: the normal at the centerline, the tangents at the surface, `arm` away from it. Friction
+    /// does not turn a thread about its own direction `along`.
+    pub fn new(element: usize, s: f64, axes: [DVec3; 3], arm: DVec3, along: DVec3) -> Self {
+        let across = |v: DVec3| v - along * along.dot(v);
+        let turn = DMat3::from_cols(DVec3::ZERO, across(arm.cross(axes[1])), across(arm.cross(axes[2])));
+        let axes = DMat3::from_cols(axes[0], axes[1], axes[2]);
+        Endpoint { element, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
+    }
+
+    fn push(&self, force: DVec3, right: &mut [DVec3]) {
+        right[2 * self.element] += self.here.x * force;
+        right[2 * self.element + 1] += self.here.t * force;
+        right[2 * self.element + 2] += self.next * force;
+    }
+
+    fn work(&self, force: DVec3, step: &[DVec3]) -> f64 {
+        let k = 2 * self.element;
+        (self.here.x * force).dot(step[k]) + (self.here.t * force).dot(step[k + 1]) + (self.next * force).dot(step[k + 2])
+    }
+}
+
+/// One contact.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry {
+    pub source: Source,
+    /// The second counts only with `two`: a shape's side has no rod behind it.
+    pub ends: [Endpoint; 2],
+    pub two: bool,
+    /// A pushed shape's number and what a unit move of it adds to the three components.
+    pub slider: Option<(usize, DVec3)>,
+    /// Gap, and slip still to undo, that the step without contact forces would leave \[m\].
+    pub free: DVec3,
+    pub mu: f64,
+    pub compliance: f64,
+    pub radius: f64,
+    /// Force along the axes \[N\].
+    pub force: DVec3,
+}
+
+impl Entry {
+    fn ends(&self) -> &[Endpoint] {
+        &self.ends[..1 + usize::from(self.two)]
+    }
+}
+
+/// An endpoint and the number of its entry.
+#[derive(Debug, Clone, Copy)]
+struct Placed {
+    entry: u32,
+    at: Endpoint,
+}
+
+/// Memory of the coupling.
+#[derive(Default)]
+pub(crate) struct Coupling {
+    entries: Vec<Entry>,
+    endpoints: Vec<Placed>,
+    /// Zone blocks that endpoints touch, ascending, and the transfer from each to the one before it.
+    blocks: Vec<usize>,
+    jumps: Vec<Block>,
+    s: Vec<f64>,
+    b: Vec<f64>,
+    mu: Vec<f64>,
+    force: Vec<f64>,
+    cone: Cone,
+    right: Vec<DVec3>,
+    /// Response of each component to the pushed shapes.
+    reach: Vec<f64>,
+    small: Vec<f64>,
+    /// Residual of the last solution, in radii.
+    left: f64,
+}
+
+/// Forgets the contacts of the last substep.
+pub(crate) fn begin(scratch: &mut Scratch) {
+    scratch.rows.solver.entries.clear();
+}
+
+/// Sets the zone of each rod: from the first to the last block that the small problem may touch.
+pub(crate) fn zones(scratch: &mut Scratch) {
+    let Scratch { rods, rows, .. } = scratch;
+    for (blocks, zone) in rods.iter_mut() {
+        let (mut lo, mut hi) = (usize::MAX, 0);
+        let touched = rows.threads.iter().flat_map(thread::ThreadRow::elements).chain(rows.shapes.iter().filter_map(shape::ShapeRow::entering));
+        for e in touched.filter(|e| blocks.contains(e)) {
+            lo = lo.min(e);
+            hi = hi.max(e + 1);
+        }
+        *zone = if lo == usize::MAX { blocks.end - 1..blocks.end } else { lo..hi + 1 };
+    }
+}
+
+/// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
+pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
+    let Scratch { rods, rows, system, step, start, start_frame, start_shape_pose, .. } = scratch;
+    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let entries = &mut rows.solver.entries;
+    entries.clear();
+    thread::enter(state, &start, step, &mut rows.threads, entries);
+    shape::enter(state, &start, step, &mut rows.shapes, &rows.sliders, entries);
+    rows.solver.left = 0.0;
+    if rows.solver.entries.is_empty() {
+        return;
+    }
+    let Coupling { entries, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, left } = &mut rows.solver;
+    b.clear();
+    mu.clear();
+    force.clear();
+    for entry in entries.iter() {
+        b.extend(entry.free.to_array());
+        mu.push(entry.mu);
+        force.extend(entry.force.to_array());
+    }
+    let n = b.len();
+    s.clear();
+    s.resize(n * n, 0.0);
+    for (_, zone) in rods.iter() {
+        endpoints.clear();
+        for (k, entry) in entries.iter().enumerate() {
+            let inside = |p: &&Endpoint| zone.contains(&p.element) && p.element + 1 < zone.end;
+            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: *at }));
+        }
+        if endpoints.is_empty() {
+            continue;
+        }
+        endpoints.sort_unstable_by_key(|p| (p.at.element, p.entry));
+        system.invert_zone(zone);
+        blocks.clear();
+        for p in endpoints.iter() {
+            for k in [p.at.element, p.at.element + 1] {
+                if blocks.last().is_none_or(|l| *l < k) {
+                    blocks.push(k);
+                }
+            }
+        }
+        // Transfer from each touched block up to the one before it.
+        jumps.clear();
+        jumps.push(Block::default());
+        for pair in blocks.windows(2) {
+            let mut jump = system.transfer(pair[1] - 1).negated();
+            for k in (pair[0]..pair[1] - 1).rev() {
+                jump = system.transfer(k).negated().mul(&jump);
+            }
+            jumps.push(jump);
+        }
+        compliance_between(system, endpoints, blocks, jumps, s, n);
+    }
+    // What gives way with the pushed shapes: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape itself moves.
+    let m = rows.sliders.count();
+    if m > 0 {
+        reach.clear();
+        for entry in entries.iter() {
+            for axis in 0..3 {
+                let unit = DVec3::AXES[axis];
+                for k in 0..m {
+                    let own = entry.slider.map_or(0.0, |(j, d)| if j == k { d[axis] } else { 0.0 });
+                    reach.push(entry.ends().iter().map(|p| p.work(unit, rows.sliders.response(k))).sum::<f64>() - own);
+                }
+            }
+        }
+        for i in 0..n {
+            small.clear();
+            small.extend_from_slice(&reach[i * m..(i + 1) * m]);
+            rows.sliders.solve_small(small);
+            for j in i..n {
+                s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+    let mut smallest = f64::INFINITY;
+    for (k, entry) in entries.iter().enumerate() {
+        smallest = smallest.min(entry.radius);
+        for i in 3 * k..3 * k + 3 {
+            s[i * n + i] += entry.compliance;
+            for j in 0..i {
+                s[i * n + j] = s[j * n + i];
+            }
+        }
+    }
+    let limits = Limits {
+        inner: params::CONTACT_TOLERANCE * smallest,
+        outer: 2.0 * params::CONTACT_TOLERANCE * smallest,
+        max_inner: 20,
+        max_outer: 6,
+        proximal: params::PROXIMAL,
+    };
+    *left = cone.solve(s, b, mu, force, &limits) / smallest;
+    right.clear();
+    right.resize(step.len(), DVec3::ZERO);
+    for (k, entry) in entries.iter_mut().enumerate() {
+        entry.force = DVec3::new(force[3 * k], force[3 * k + 1], force[3 * k + 2]);
+        for p in entry.ends() {
+            p.push(entry.force, right);
+        }
+        if let Some((slider, direction)) = entry.slider {
+            rows.sliders.load(slider, direction.dot(entry.force));
+        }
+        match entry.source {
+            Source::Thread(k) => rows.threads[k as usize].force = entry.force,
+            Source::Shape(k) => rows.shapes[k as usize].solved(entry.force),
+        }
+    }
+    for (node, r) in right.iter_mut().enumerate() {
+        if scratch.freedom[node] != Freedom::Free {
+            *r = scratch.freedom[node].projector() * *r;
+        }
+    }
+    for (rod, zone) in rods.iter() {
+        system.solve(rod.clone(), zone, right);
+    }
+    rows.sliders.couple(right, true);
+    for (z, r) in step.iter_mut().zip(right.iter()) {
+        *z += *r;
+    }
+}
+
+/// Whether the small problem was solved well enough for the step to count.
+pub(crate) fn solved(scratch: &Scratch) -> bool {
+    scratch.rows.solver.left < params::CONTACT_LEFT
+}
+
+/// Adds the entries' forces to `scratch.rhs`.
+pub(crate) fn add_forces(scratch: &mut Scratch) {
+    let Scratch { rows, rhs, .. } = scratch;
+    for entry in &rows.solver.entries {
+        for p in entry.ends() {
+            p.push(entry.force, rhs);
+        }
+    }
+}
+
+/// Work of the entries' forces along the step.
+pub(crate) fn work(scratch: &Scratch) -> f64 {
+    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, &scratch.step)).sum::<f64>();
+    scratch.rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
+}
+
+/// Adds `G W G^T` over the endpoints of one rod to the upper triangle of `s`.
+fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], jumps: &[Block], s: &mut [f64], n: usize) {
+    for (qi, q) in endpoints.iter().enumerate() {
+        // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
+        let (e, q_at) = (q.at.element, &q.at);
+        let (x_here, x_next, k) = (system.inverse(e), system.inverse(e + 1), system.transfer(e));
+        let kt = k.transpose().mul_columns(&q_at.here);
+        let pushed = Columns { x: q_at.next - kt.x, t: -kt.t };
+        let mut next = x_next.mul_columns(&pushed);
+        let direct = x_next.mul_columns(&Columns { x: q_at.next, t: DMat3::ZERO });
+        let up = k.mul_columns(&direct);
+        let own = x_here.mul_columns(&q_at.here);
+        let mut here = Columns { x: own.x - up.x, t: own.t - up.t };
+        let mut at = blocks.partition_point(|b| *b < e);
+        let mut pi = qi + 1;
+        // Endpoints on the same element after q are handled when they are q.
+        while pi > 0 {
+            pi -= 1;
+            let p = &endpoints[pi];
+            while blocks[at] > p.at.element {
+                at -= 1;
+                next = here;
+                here = jumps[at + 1].mul_columns(&here);
+            }
+            let value = p.at.here.x.transpose() * here.x + p.at.here.t.transpose() * here.t + p.at.next.transpose() * next.x;
+            let (r, c) = (3 * p.entry as usize, 3 * q.entry as usize);
+            for j in 0..3 {
+                for i in 0..3 {
+                    let v = value.col(j)[i];
+                    if r < c {
+                        s[(r + i) * n + c + j] += v;
+                    } else if r > c {
+                        s[(c + j) * n + r + i] += v;
+                    } else {
+                        // Both sides of one row on one rod: count the pair and its mirror image.
+                        let twice = pi != qi;
+                        s[(r + i) * n + c + j] += v;
+                        if twice {
+                            s[(r + j) * n + c + i] += v;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+

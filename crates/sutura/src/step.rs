@@ -322,7 +322,7 @@ fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
             Hold::Pin => {}
             Hold::Clamp => {
                 for c in scratch.clamps.iter().filter(|c| c.grip == slot) {
-                    let (moment, _) = newton::clamp_terms(c, state.orientation[c.frame as usize], h);
+                    let (moment, _) = crate::rod::assemble::clamp_terms(c, state.orientation[c.frame as usize], h);
                     grip.torque += if c.first { -moment } else { moment };
                 }
             }

@@ -1,5 +1,6 @@
 //! The discrete Cosserat rod: strains, their linear system, and read-outs.
 
+pub(crate) mod assemble;
 pub(crate) mod factor;
 pub(crate) mod strain;
 pub(crate) mod torque;

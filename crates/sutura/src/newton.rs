@@ -37,7 +37,7 @@ pub(crate) struct Outcome {
 /// Solves the substep of length `h` from `scratch.start`, carried on to `scratch.target` by its velocity; the iterate is in `state`.
 pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) -> Outcome {
     let settings = &model.settings;
-    scratch.tension.copy_from_slice(&state.tension);
+    carried_forces(model, state, scratch);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails.
     let mut exact = true;
@@ -95,6 +95,18 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         }
     }
     out
+}
+
+/// Tension and shear force that the start of the substep carries into the geometric stiffness.
+fn carried_forces(model: &Model, state: &State, scratch: &mut Scratch) {
+    scratch.tension.copy_from_slice(&state.tension);
+    for r in 0..scratch.rods.len() {
+        let rod = scratch.rods[r].0.clone();
+        for e in rod.start..rod.end - 1 {
+            let strain = scratch.start_frame[e].conjugate() * (scratch.start[e + 1] - scratch.start[e]);
+            scratch.shear[e] = strain.truncate() * model.stretch_stiffness[e].truncate();
+        }
+    }
 }
 
 /// Work of the forces at the iterate, contact forces as last found, along the last step.
@@ -165,13 +177,13 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
         for e in rod.start..rod.end - 1 {
-            // Predicted tension: strain now plus its linear change.
+            // Predicted force: strain now plus its linear change.
             let (q, d) = (state.orientation[e], state.position[e + 1] - state.position[e]);
             let change = scratch.step[2 * e + 2] - scratch.step[2 * e] + d.cross(scratch.step[2 * e + 1]);
-            let along = q * DVec3::Z;
-            let stretch = along.dot(d) - model.rest_length[e] + scale * along.dot(change);
-            let t = stretch * model.stretch_stiffness[e].z;
-            scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + t } else { t };
+            let strain = q.conjugate() * (d + change * scale) - DVec3::new(0.0, 0.0, model.rest_length[e]);
+            let f = strain * model.stretch_stiffness[e];
+            scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + f.z } else { f.z };
+            scratch.shear[e] = f.truncate();
         }
         for i in rod.clone() {
             state.position[i] += scratch.step[2 * i] * scale;

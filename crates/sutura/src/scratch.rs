@@ -7,7 +7,7 @@ use crate::rod::torque::TorqueCorrection;
 use crate::row::Rows;
 use crate::state::State;
 use core::ops::Range;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// What may move at a node of the linear system.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +80,8 @@ pub(crate) struct Scratch {
     pub step: Vec<DVec3>,
     /// Predicted tension after the current iteration, for geometric stiffness.
     pub tension: Vec<f64>,
+    /// Predicted shear force along the first two directors, likewise.
+    pub shear: Vec<DVec2>,
 
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
@@ -105,6 +107,7 @@ impl Scratch {
         self.rhs.resize(2 * n, DVec3::ZERO);
         self.step.resize(2 * n, DVec3::ZERO);
         self.tension.resize(n, 0.0);
+        self.shear.resize(n, DVec2::ZERO);
         self.radius.clear();
         self.radius.extend(model.rod_of.iter().map(|r| model.rods.at(*r).map_or(0.0, |r| r.radius)));
         self.rods.clear();

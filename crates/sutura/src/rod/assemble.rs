@@ -65,7 +65,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
             let geometric = (DMat3::IDENTITY - outer(t, t)) * (tension / l);
             let kx = kw + geometric;
             if exact {
-                let shear = (force - t * t.dot(force)) * (0.5 * l);
+                let shear = (r.x_axis * scratch.shear[e].x + r.y_axis * scratch.shear[e].y) * (0.5 * l);
                 system.diagonal[2 * e + 1] -= outer(shear, t) + outer(t, shear);
             }
             let dx = skew(d);
@@ -170,7 +170,8 @@ mod tests {
             scratch.target.copy_from_slice(&state.position);
             scratch.target_frame.copy_from_slice(&state.orientation);
             for e in 0..n {
-                scratch.tension[e] = element_strain(&model, state, e).z * model.stretch_stiffness[e].z;
+                let f = element_strain(&model, state, e) * model.stretch_stiffness[e];
+                (scratch.tension[e], scratch.shear[e]) = (f.z, f.truncate());
             }
             assemble(&model, state, scratch, h, Hessian::Exact);
             scratch.rhs.iter().map(|v| -*v).collect::<Vec<_>>()

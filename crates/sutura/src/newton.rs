@@ -7,7 +7,8 @@
 
 use crate::math::{exp, outer};
 use crate::model::Model;
-use crate::rod::assemble::{Hessian, assemble};
+use crate::model::grip::Hold;
+use crate::rod::assemble::{Hessian, assemble, assemble_blocks, assemble_clamps};
 use crate::rod::element_strain;
 use crate::row;
 use crate::row::pushed::Sliders;
@@ -22,6 +23,9 @@ const LENGTH_TOLERANCE: f64 = 5e-6;
 const SHORTEST: f64 = 0.3;
 /// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is shortened.
 const OVERSHOOT: f64 = 0.5;
+
+/// Turn of an iteration over that of the one before beyond which a substep without contacts goes over to the exact matrix.
+const SLOW: f64 = 0.3;
 
 /// How a Newton solve ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +43,11 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
-    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails.
-    let mut exact = true;
+    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly
+    // gets there in two iterations, so the exact one has to wait until progress is slow.
+    let mut exact = !scratch.rows.is_empty();
+    let mut waiting = !exact;
+    let mut before = f64::INFINITY;
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0, 1.0);
     while out.iterations < settings.newton_max {
@@ -82,6 +89,10 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         apply(model, state, scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
+        if waiting && (out.turn > SLOW * before || !scratch.rows.is_empty()) {
+            (waiting, exact) = (false, true);
+        }
+        before = out.turn;
         out.residual = out.residual.max(slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
         let stretched = inextensible_error(model, state);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
@@ -146,16 +157,22 @@ fn restrict(state: &State, scratch: &mut Scratch) {
     }
 }
 
-/// Leaves in `scratch.rhs` the force and torque that each node lacks for balance without its grip: minus what the grip exerts.
+/// Leaves in `scratch.rhs`, at the grips, the force and torque that each node lacks for balance without its grip: minus what the grip exerts.
 pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
-    scratch.tension.copy_from_slice(&state.tension);
-    for e in 0..scratch.tension.len() {
-        // The multiplier alone is the tension of an inextensible element; its penalty is taken off again.
-        if model.inextensible[e] && model.is_element(e) {
-            scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
+    for (_, grip) in state.grips.iter() {
+        let rod = model.rods.at(grip.rod).expect("grips go with their rod");
+        let first = rod.first as usize + grip.index as usize;
+        let held = if grip.hold == Hold::Jaw { first..first + 2 } else { first..first + 1 };
+        for e in held.start.max(rod.first as usize + 1) - 1..held.end.min(rod.elements().end) {
+            scratch.tension[e] = state.tension[e];
+            if model.inextensible[e] {
+                // The multiplier alone is the tension of an inextensible element; its penalty is taken off again.
+                scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
+            }
         }
+        assemble_blocks(model, state, scratch, h, Hessian::Positive, &rod.particles(), held);
     }
-    assemble(model, state, scratch, h, Hessian::Positive);
+    assemble_clamps(state, scratch, h);
     row::shape::assemble(model, state, scratch, h, false);
     row::thread::add_forces(scratch);
 }

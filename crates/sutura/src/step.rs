@@ -171,7 +171,8 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             scratch.target[i] = state.position[i];
         }
         for e in rod.start..rod.end - 1 {
-            if e > rod.start {
+            // Only damping asks for it.
+            if e > rod.start && model.bend_damping[e] != 0.0 {
                 scratch.start_angle[e] = crate::rod::strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
             }
         }

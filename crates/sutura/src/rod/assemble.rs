@@ -1,10 +1,11 @@
 //! The Newton matrix and right side of the rods.
 
-use crate::math::{log, outer, skew};
+use crate::math::log;
 use crate::model::Model;
-use crate::rod::{element_strain, strain};
+use crate::rod::strain;
 use crate::scratch::{ClampJoint, Scratch};
 use crate::state::State;
+use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Which second derivatives of the elastic energy go into the matrix. The residual is exact in either case.
@@ -18,121 +19,227 @@ pub(crate) enum Hessian {
 
 /// Residual and Hessian of inertia, elasticity and loads at the iterate.
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian) {
+    for r in 0..scratch.rods.len() {
+        let rod = scratch.rods[r].0.clone();
+        assemble_blocks(model, state, scratch, h, hessian, &rod, rod.clone());
+    }
+    assemble_clamps(state, scratch, h);
+}
+
+/// Rows of the particles and frames `blocks` of a rod, each written once.
+pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, rod: &Range<usize>, blocks: Range<usize>) {
     let exact = hessian == Hessian::Exact;
     let inv_h2 = 1.0 / (h * h);
-    let system = &mut scratch.system;
-    let rhs = &mut scratch.rhs;
-    for (rod, _) in &scratch.rods {
-        let last = rod.end - 1;
-        for i in rod.clone() {
-            let w = model.mass[i] * inv_h2;
-            system.diagonal[2 * i] = DMat3::from_diagonal(DVec3::splat(w));
-            rhs[2 * i] = (scratch.target[i] - state.position[i]) * w + scratch.force[i];
-            system.next[2 * i] = DMat3::ZERO;
-            system.after[2 * i] = DMat3::ZERO;
-            system.next[2 * i + 1] = DMat3::ZERO;
-            system.after[2 * i + 1] = DMat3::ZERO;
-        }
-        system.diagonal[2 * last + 1] = DMat3::IDENTITY;
-        rhs[2 * last + 1] = DVec3::ZERO;
-        for e in rod.start..last {
-            // Spin inertia in world axes; its change with the frame (gyroscopic moment) is of the order (radius / length)^2 for a
-            // thread and is left out.
-            let r = DMat3::from_quat(state.orientation[e]);
-            let inertia = congruent(&r, model.inertia[e] * inv_h2);
-            let off = log(scratch.target_frame[e] * state.orientation[e].conjugate());
-            system.diagonal[2 * e + 1] = inertia;
-            rhs[2 * e + 1] = inertia * off + scratch.torque[e];
-        }
-        for e in rod.start..last {
-            let r = DMat3::from_quat(state.orientation[e]);
-            let d = state.position[e + 1] - state.position[e];
-            let l = model.rest_length[e];
-            let k = model.stretch_stiffness[e];
-            let mut f = element_strain(model, state, e) * k;
-            if model.inextensible[e] {
-                f.z += scratch.tension[e];
-            }
-            let force = r * f;
-            rhs[2 * e] += force;
-            rhs[2 * e + 2] -= force;
-            rhs[2 * e + 1] += d.cross(force);
-            let kw = congruent(&r, k);
-            // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
-            // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
-            let t = r.z_axis;
-            let tension = if exact { scratch.tension[e] } else { scratch.tension[e].max(0.0) };
-            let geometric = (DMat3::IDENTITY - outer(t, t)) * (tension / l);
-            let kx = kw + geometric;
-            if exact {
-                let shear = (r.x_axis * scratch.shear[e].x + r.y_axis * scratch.shear[e].y) * (0.5 * l);
-                system.diagonal[2 * e + 1] -= outer(shear, t) + outer(t, shear);
-            }
-            let dx = skew(d);
-            let kd = kw * dx;
-            system.diagonal[2 * e] += kx;
-            system.diagonal[2 * e + 2] += kx;
-            system.after[2 * e] -= kx;
-            system.next[2 * e] -= kd;
-            system.next[2 * e + 1] += kd.transpose();
-            system.diagonal[2 * e + 1] -= dx * kd;
-        }
-        for e in rod.start + 1..last {
-            if !scratch.joint_on[e] {
-                continue;
-            }
-            let j = strain::joint(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
-            let (moment, b) = joint_terms(&j, state.plastic[e], scratch.start_angle[e], model.bend_stiffness[e], model.bend_damping[e], h);
-            rhs[2 * e - 1] += moment;
-            rhs[2 * e + 1] -= moment;
-            system.diagonal[2 * e - 1] += b;
-            system.diagonal[2 * e + 1] += b;
-            system.after[2 * e - 1] -= b;
-            if exact {
-                // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
-                system.after[2 * e - 1] += skew(moment) * 0.5;
-            }
+    let last = rod.end - 1;
+    // What the element and the joint before block e add to it.
+    let (mut force, mut kx) = (DVec3::ZERO, Sym::ZERO);
+    let (mut moment, mut kt) = (DVec3::ZERO, Sym::ZERO);
+    if blocks.start > rod.start {
+        let before = element(model, state, scratch, blocks.start - 1, exact);
+        (force, kx) = (before.force, before.kx);
+        if blocks.start < last && scratch.joint_on[blocks.start] {
+            (moment, kt) = joint_before(model, state, scratch, blocks.start, h);
         }
     }
-    for c in &scratch.clamps {
-        let e = c.frame as usize;
-        let (moment, b) = clamp_terms(c, state.orientation[e], h);
-        if c.first {
-            rhs[2 * e + 1] -= moment;
-        } else {
-            rhs[2 * e + 1] += moment;
+    for e in blocks {
+        let w = model.mass[e] * inv_h2;
+        let particle = Sym::scalar(w).plus(&kx);
+        let push = (scratch.target[e] - state.position[e]) * w + scratch.force[e] - force;
+        let system = &mut scratch.system;
+        if e == last {
+            system.diagonal[2 * e] = particle.matrix();
+            system.diagonal[2 * e + 1] = DMat3::IDENTITY;
+            for node in [2 * e, 2 * e + 1] {
+                system.next[node] = DMat3::ZERO;
+                system.after[node] = DMat3::ZERO;
+            }
+            scratch.rhs[2 * e] = push;
+            scratch.rhs[2 * e + 1] = DVec3::ZERO;
+            break;
         }
-        system.diagonal[2 * e + 1] += b;
+        let own = element(model, state, scratch, e, exact);
+        let spin = spin(model, state, scratch, e, inv_h2, own.axis);
+        let (next_moment, next_kt) =
+            if e + 1 < last && scratch.joint_on[e + 1] { joint_before(model, state, scratch, e + 1, h) } else { (DVec3::ZERO, Sym::ZERO) };
+        let system = &mut scratch.system;
+        system.diagonal[2 * e] = particle.plus(&own.kx).matrix();
+        system.next[2 * e] = -own.kd;
+        system.after[2 * e] = -own.kx.matrix();
+        system.diagonal[2 * e + 1] = spin.1.plus(&own.kt).plus(&kt).plus(&next_kt).matrix();
+        system.next[2 * e + 1] = own.kd.transpose();
+        // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
+        system.after[2 * e + 1] = next_kt.negated_with_skew(if exact { next_moment * 0.5 } else { DVec3::ZERO });
+        scratch.rhs[2 * e] = push + own.force;
+        scratch.rhs[2 * e + 1] = spin.0 + scratch.torque[e] + own.torque + (next_moment - moment);
+        (force, kx) = (own.force, own.kx);
+        (moment, kt) = (next_moment, next_kt);
     }
 }
 
-/// Moment in world axes that the joint exerts on its first frame, and the stiffness against relative rotation.
-#[inline]
-fn joint_terms(j: &strain::Joint, plastic: DVec3, start: DVec3, stiffness: DVec3, damping: f64, h: f64) -> (DVec3, DMat3) {
+/// Adds the moments of the clamps.
+pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch, h: f64) {
+    for c in &scratch.clamps {
+        let node = 2 * c.frame as usize + 1;
+        let (moment, b) = clamp_terms(c, state.orientation[c.frame as usize], h);
+        scratch.rhs[node] += if c.first { -moment } else { moment };
+        scratch.system.diagonal[node] += b;
+    }
+}
+
+/// What an element does to the particles at its ends and to its frame.
+struct Element {
+    /// Third director.
+    axis: DVec3,
+    /// Force on the first particle, minus that on the second.
+    force: DVec3,
+    /// Torque on the frame.
+    torque: DVec3,
+    /// Second derivatives: of the particles; of the first particle and the frame, with a minus; of the frame.
+    kx: Sym,
+    kd: DMat3,
+    kt: Sym,
+}
+
+#[inline(always)]
+fn element(model: &Model, state: &State, scratch: &Scratch, e: usize, exact: bool) -> Element {
+    let r = DMat3::from_quat(state.orientation[e]);
+    let t = r.z_axis;
+    let d = state.position[e + 1] - state.position[e];
+    let l = model.rest_length[e];
+    // Shear stiffness is the same in both directions: R K R^T = a I + b t t^T.
+    let k = model.stretch_stiffness[e];
+    let (a, b) = (k.x, k.z - k.x);
+    let along = t.dot(d);
+    let carried = scratch.tension[e];
+    let multiplier = if model.inextensible[e] { carried } else { 0.0 };
+    let force = (d - t * along) * a + t * (k.z * (along - l) + multiplier);
+    // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
+    // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
+    let g = if exact { carried } else { carried.max(0.0) } / l;
+    // With n = t x d: R K R^T [d]x = a [d]x + b t n^T, and [d]x^T R K R^T [d]x = a (d^2 I - d d^T) + b n n^T.
+    let n = t.cross(d);
+    let (bn, ad) = (n * b, d * a);
+    let kd = DMat3::from_cols(
+        DVec3::new(t.x * bn.x, t.y * bn.x + ad.z, t.z * bn.x - ad.y),
+        DVec3::new(t.x * bn.y - ad.z, t.y * bn.y, t.z * bn.y + ad.x),
+        DVec3::new(t.x * bn.z + ad.y, t.y * bn.z - ad.x, t.z * bn.z),
+    );
+    let mut kt = Sym::scalar(a * d.length_squared()).square(d, -a).square(n, b);
+    if exact {
+        let shear = (r.x_axis * scratch.shear[e].x + r.y_axis * scratch.shear[e].y) * (0.5 * l);
+        kt = kt.less_product(shear, t);
+    }
+    Element { axis: t, force, torque: d.cross(force), kx: Sym::scalar(a + g).square(t, b - g), kd, kt }
+}
+
+/// Inertial torque on a frame whose third director is `t`, and spin inertia in world axes over h^2. The change of the latter with the frame
+/// (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
+#[inline(always)]
+fn spin(model: &Model, state: &State, scratch: &Scratch, e: usize, inv_h2: f64, t: DVec3) -> (DVec3, Sym) {
+    let q = state.orientation[e];
+    let i = model.inertia[e] * inv_h2;
+    let off = log(scratch.target_frame[e] * q.conjugate());
+    let mut torque = off * i.x + t * ((i.z - i.x) * t.dot(off));
+    let mut inertia = Sym::scalar(i.x).square(t, i.z - i.x);
+    // Only what is attached has different moments across.
+    if i.y != i.x {
+        let y = q * DVec3::Y;
+        torque += y * ((i.y - i.x) * y.dot(off));
+        inertia = inertia.square(y, i.y - i.x);
+    }
+    (torque, inertia)
+}
+
+/// Moment that the joint before element `e` exerts on the frame before it, and the stiffness against relative rotation.
+#[inline(always)]
+fn joint_before(model: &Model, state: &State, scratch: &Scratch, e: usize, h: f64) -> (DVec3, Sym) {
+    let j = strain::joint(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
+    joint_terms(&j, state.plastic[e], scratch.start_angle[e], model.bend_stiffness[e], model.bend_damping[e], h)
+}
+
+/// Moment in world axes that the joint exerts on its first frame, and the stiffness against relative rotation. Bending stiffness is the
+/// same in both directions.
+#[inline(always)]
+fn joint_terms(j: &strain::Joint, plastic: DVec3, start: DVec3, stiffness: DVec3, damping: f64, h: f64) -> (DVec3, Sym) {
     let gamma = damping / h;
     let moment = stiffness * ((j.angle - plastic) + (j.angle - start) * gamma);
-    let jt = j.derivative.transpose();
-    let b = stiffness * (1.0 + gamma);
-    (jt * moment, congruent(&jt, b))
+    let (bend, twist) = (stiffness.x * (1.0 + gamma), stiffness.z * (1.0 + gamma));
+    // With the derivative M R^T, M = s I - c theta theta^T: M M = s^2 I - (2 s c - c^2 theta^2) theta theta^T.
+    let (s, c) = (1.0 + j.c * j.squared, j.c);
+    let w = j.middle * j.angle;
+    let axis = j.middle.z_axis * s - w * (c * j.angle.z);
+    let b = Sym::scalar(bend * s * s).square(w, bend * c * (c * j.squared - 2.0 * s)).square(axis, twist - bend);
+    (j.middle * (moment * s) - w * (c * j.angle.dot(moment)), b)
 }
 
 /// The same for a clamp. The moment is that on the first of the two.
 pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat, h: f64) -> (DVec3, DMat3) {
     let j = if c.first { strain::joint(c.orientation, q, c.rest_half) } else { strain::joint(q, c.orientation, c.rest_half) };
-    joint_terms(&j, DVec3::ZERO, c.start, c.stiffness, c.damping, h)
+    let (moment, b) = joint_terms(&j, DVec3::ZERO, c.start, c.stiffness, c.damping, h);
+    (moment, b.matrix())
 }
 
-/// `a diag(k) a^T`.
-#[inline]
-fn congruent(a: &DMat3, k: DVec3) -> DMat3 {
-    let s = DMat3::from_cols(a.x_axis * k.x, a.y_axis * k.y, a.z_axis * k.z);
-    s * a.transpose()
+/// A symmetric 3x3 matrix.
+#[derive(Debug, Clone, Copy)]
+struct Sym {
+    xx: f64,
+    yy: f64,
+    zz: f64,
+    xy: f64,
+    xz: f64,
+    yz: f64,
+}
+
+impl Sym {
+    const ZERO: Sym = Sym { xx: 0.0, yy: 0.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+
+    /// `s I`.
+    #[inline(always)]
+    fn scalar(s: f64) -> Self {
+        Sym { xx: s, yy: s, zz: s, ..Sym::ZERO }
+    }
+    /// `self + k v v^T`.
+    #[inline(always)]
+    fn square(self, v: DVec3, k: f64) -> Self {
+        let w = v * k;
+        self.plus(&Sym { xx: v.x * w.x, yy: v.y * w.y, zz: v.z * w.z, xy: v.x * w.y, xz: v.x * w.z, yz: v.y * w.z })
+    }
+    /// `self - a b^T - b a^T`.
+    #[inline(always)]
+    fn less_product(self, a: DVec3, b: DVec3) -> Self {
+        Sym {
+            xx: self.xx - 2.0 * (a.x * b.x),
+            yy: self.yy - 2.0 * (a.y * b.y),
+            zz: self.zz - 2.0 * (a.z * b.z),
+            xy: self.xy - (a.x * b.y + a.y * b.x),
+            xz: self.xz - (a.x * b.z + a.z * b.x),
+            yz: self.yz - (a.y * b.z + a.z * b.y),
+        }
+    }
+    #[inline(always)]
+    fn plus(self, o: &Sym) -> Self {
+        Sym { xx: self.xx + o.xx, yy: self.yy + o.yy, zz: self.zz + o.zz, xy: self.xy + o.xy, xz: self.xz + o.xz, yz: self.yz + o.yz }
+    }
+    #[inline(always)]
+    fn matrix(&self) -> DMat3 {
+        DMat3::from_cols(DVec3::new(self.xx, self.xy, self.xz), DVec3::new(self.xy, self.yy, self.yz), DVec3::new(self.xz, self.yz, self.zz))
+    }
+    /// `[v]x - self`.
+    #[inline(always)]
+    fn negated_with_skew(&self, v: DVec3) -> DMat3 {
+        DMat3::from_cols(
+            DVec3::new(-self.xx, v.z - self.xy, -v.y - self.xz),
+            DVec3::new(-v.z - self.xy, -self.yy, v.x - self.yz),
+            DVec3::new(v.y - self.xz, -v.x - self.yz, -self.zz),
+        )
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::math::exp;
+    use crate::rod::element_strain;
     use crate::{Material, RodSpec, World};
 
     /// Numbers in [-0.5, 0.5) from a seed.

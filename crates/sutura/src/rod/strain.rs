@@ -11,47 +11,47 @@
 //! Source: Kugelstadt and Schoemer 2016 (staggered frames); Deul et al. 2018 (physical compliance). The logarithm instead of 2 Im(q) and
 //! the symmetric rest are ours.
 
-use crate::math::{exp, log, outer};
+use crate::math::{log, log_and_root};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Angle of a joint along the directors halfway, and its derivative.
+/// Angle of a joint along the directors halfway, and what its derivative d theta / d (phi1 - phi0) = M Rm^T is made of.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Joint {
-    /// theta \[rad\].
+    /// theta \[rad\], and its square.
     pub angle: DVec3,
-    /// d theta / d (phi1 - phi0).
-    pub derivative: DMat3,
+    pub squared: f64,
+    /// Rm.
+    pub middle: DMat3,
+    /// M = (1 + c theta^2) I - c theta theta^T.
+    pub c: f64,
 }
 
 /// Rotation angle of a joint from its rest value.
 #[inline]
 pub(crate) fn joint_angle(q0: DQuat, q1: DQuat, rest_half: DQuat) -> DVec3 {
-    let back = rest_half.conjugate();
-    log(back * (q0.conjugate() * q1) * back)
+    log((q0 * rest_half).conjugate() * (q1 * rest_half.conjugate()))
 }
 
 /// The same with its derivative.
-#[inline]
+#[inline(always)]
 pub(crate) fn joint(q0: DQuat, q1: DQuat, rest_half: DQuat) -> Joint {
-    let angle = joint_angle(q0, q1, rest_half);
-    let middle = q0 * rest_half * exp(angle * 0.5);
-    let rt = DMat3::from_quat(middle).transpose();
-    let t2 = angle.length_squared();
-    // (a / sin a - 1) / theta^2 with a = theta / 2: series below, exact above.
-    let c = if t2 < 0.04 {
-        1.0 / 24.0 + t2 * (7.0 / 5760.0 + t2 * (31.0 / 967_680.0 + t2 * (127.0 / 154_828_800.0)))
+    let first = q0 * rest_half;
+    let turn = first.conjugate() * (q1 * rest_half.conjugate());
+    let (angle, half_over_sine, root) = log_and_root(turn);
+    let squared = angle.length_squared();
+    // (a / sin a - 1) / theta^2 with a = theta / 2: series below, exact above. Near half a turn sin a is still near 1, so M is bounded by pi / 2.
+    let c = if squared < 0.04 {
+        1.0 / 24.0 + squared * (7.0 / 5760.0 + squared * (31.0 / 967_680.0 + squared * (127.0 / 154_828_800.0)))
     } else {
-        let a = 0.5 * t2.sqrt();
-        (a / libm::sin(a) - 1.0) / t2
+        (half_over_sine - 1.0) / squared
     };
-    // Near half a turn sin a is still near 1, so M is bounded by pi / 2.
-    let m = DMat3::from_diagonal(DVec3::splat(1.0 + c * t2)) - outer(angle, angle) * c;
-    Joint { angle, derivative: m * rt }
+    Joint { angle, squared, middle: DMat3::from_quat(first * root), c }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{exp, outer};
 
     #[test]
     fn derivative_matches_differences() {
@@ -67,7 +67,8 @@ mod tests {
                 d[axis] = e;
                 let up = joint_angle(q0, exp(d) * q1, rest);
                 let down = joint_angle(exp(d) * q0, q1, rest);
-                let got = j.derivative.col(axis);
+                let m = DMat3::from_diagonal(DVec3::splat(1.0 + j.c * j.squared)) - outer(j.angle, j.angle) * j.c;
+                let got = (m * j.middle.transpose()).col(axis);
                 // Forward differences of step 1e-6.
                 assert!(((up - j.angle) / e - got).length() < 1e-5, "size {size} axis {axis}: {:?} {:?}", (up - j.angle) / e, got);
                 assert!(((down - j.angle) / e + got).length() < 1e-5);

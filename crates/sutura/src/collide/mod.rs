@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::params;
 use crate::scratch::Scratch;
 use crate::state::State;
+use core::ops::Range;
 use glam::DVec3;
 use tree::{Bounds, Tree};
 
@@ -23,6 +24,10 @@ pub(crate) struct Candidates {
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
     tree: Tree,
+    /// Total turning of the centerline up to each element \[rad\], at the start of the substep, at the iterate, and when it was judged.
+    turned: [Vec<f64>; 3],
+    /// The last element up to which a thread is nearly straight from each element on, at the start and at the iterate.
+    straight: Vec<usize>,
 }
 
 /// Least clearances of an accepted state, in thread diameters.
@@ -32,41 +37,81 @@ pub(crate) struct Clearance {
     pub shape: Option<f64>,
 }
 
-impl Candidates {
-    /// Radius of the thread of an element.
-    #[inline]
-    fn radius(model: &Model, e: usize) -> f64 {
-        model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius)
-    }
+/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at least
+/// cos(1 / 2) = 0.87 of the arc between them apart.
+const STRAIGHT: f64 = 1.0;
+/// Arc between two elements of such a piece, in radii, so that they are out of reach of each other, 0.87 x 5.8 > 5.
+const STRAIGHT_APART: f64 = 5.8;
+/// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(1) x 5.8 > 3.
+const BENT: f64 = 2.0;
 
-    /// Whether two elements are so near along one thread that their overlap is bending, not contact: less than half a turn of the
-    /// thread's own radius.
-    fn neighbors(&self, model: &Model, a: usize, b: usize) -> bool {
-        model.rod_of[a] == model.rod_of[b] && self.arc[b] - self.arc[a + 1] < core::f64::consts::PI * Self::radius(model, a)
+/// Total turning of the centerline `x` up to each element; from rod to rod it jumps.
+fn turning(model: &Model, x: &[DVec3], total: &mut Vec<f64>) {
+    total.clear();
+    let (mut sum, mut before) = (0.0, None::<DVec3>);
+    for e in 0..model.mass.len() {
+        if !model.is_element(e) {
+            sum += 10.0 * BENT;
+            before = None;
+        } else {
+            let d = x[e + 1] - x[e];
+            let t = d * (1.0 / d.length());
+            if let Some(b) = before {
+                // The angle of unit vectors whose difference is c: 2 asin(c / 2) <= c + c^3 / 7 as c <= 2. Not a number for a point that is not.
+                let c2 = (t - b).length_squared();
+                sum += c2.sqrt() * (1.0 + c2 / 7.0);
+            }
+            before = Some(t);
+        }
+        total.push(sum);
     }
+}
+
+/// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than half a turn of the
+/// thread's own radius.
+#[inline]
+fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> bool {
+    arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] && model.rod_of[a] == model.rod_of[b]
 }
 
 /// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
 /// room for what Newton will add.
 pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { candidates, start, .. } = scratch;
-    let Candidates { threads, shapes, arc, tree } = candidates;
+    let Scratch { candidates, start, radius, .. } = scratch;
+    let Candidates { threads, shapes, arc, tree, turned, straight } = candidates;
+    let n = model.mass.len();
     arc.clear();
-    for e in 0..model.mass.len() {
+    for e in 0..n {
         let fresh = e == 0 || !model.is_element(e - 1);
         let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
         arc.push(s);
     }
-    let reach = params::REACH;
-    tree.fill(model.mass.len(), |e| {
+    let [at_start, now, _] = turned;
+    turning(model, start, at_start);
+    turning(model, &state.position, now);
+    straight.clear();
+    let mut last = 0;
+    for e in 0..n {
+        last = last.max(e);
+        while last + 1 < n && at_start[last + 1] - at_start[e] <= STRAIGHT && now[last + 1] - now[e] <= STRAIGHT {
+            last += 1;
+        }
+        straight.push(last);
+    }
+    tree.fill(n, |e| {
         if !model.is_element(e) {
             return Bounds::EMPTY;
         }
-        let grow = Candidates::radius(model, e) * (1.0 + reach);
+        let grow = radius[e] * (1.0 + params::REACH);
         Bounds::of(&[start[e], start[e + 1], state.position[e], state.position[e + 1]], grow)
     });
     threads.clear();
-    tree.pairs(|a, b| threads.push((a as u32, b as u32)));
+    let skip = |a: Range<usize>, b: Range<usize>| straight[a.start] + 1 >= b.end.min(n) && arc[b.start] - arc[a.end] > STRAIGHT_APART * radius[a.start];
+    tree.pairs(skip, |a, b| {
+        if !neighbors(model, arc, radius, a, b) {
+            threads.push((a as u32, b as u32));
+        }
+    });
     threads.sort_unstable();
     shapes.clear();
     for (slot, shape) in model.shapes.iter() {
@@ -74,9 +119,6 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
         tree.overlapping(&Bounds { lo, hi }, |e| shapes.push((slot, e as u32)));
     }
     shapes.sort_unstable();
-    let mut list = core::mem::take(&mut candidates.threads);
-    list.retain(|(a, b)| !candidates.neighbors(model, *a as usize, *b as usize));
-    candidates.threads = list;
 }
 
 /// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and still approach,
@@ -86,11 +128,11 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
         detect(model, state, scratch);
     }
     let mut clearance = Clearance::default();
-    let Scratch { candidates, start, start_shape_pose, .. } = scratch;
+    let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
     let x = &state.position;
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
-        let sum = Candidates::radius(model, a) + Candidates::radius(model, b);
+        let sum = radius[a] + radius[b];
         let moved = relative_motion(start, x, a, b);
         // Cheap bound from the middles before the exact distance.
         let reach = 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
@@ -115,7 +157,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
-        let r = Candidates::radius(model, e);
+        let r = radius[e];
         let side = |p: DVec3, pose| shape.collider.distance(pose, p, None);
         for (i, s) in [(e, 0.0), (e, 0.5), (e + 1, 1.0)] {
             let at = |x: &[DVec3]| if s == 0.5 { (x[e] + x[e + 1]) * 0.5 } else { x[i] };
@@ -144,16 +186,19 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
     Ok(clearance)
 }
 
-/// Whether the iterate left the boxes in which candidates were sought.
-fn outran(model: &Model, state: &State, scratch: &Scratch) -> bool {
-    (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
-        let b = scratch.candidates.tree.leaf(e);
-        let keep = Candidates::radius(model, e) * 1.1;
-        [state.position[e], state.position[e + 1]].iter().any(|p| {
-            let (lo, hi) = (b.lo + DVec3::splat(keep), b.hi - DVec3::splat(keep));
-            p.cmplt(lo).any() || p.cmpgt(hi).any()
-        })
-    })
+/// Whether the iterate left the boxes in which candidates were sought, or bent a piece that was taken as straight.
+fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
+    let Scratch { candidates, radius, .. } = scratch;
+    let x = &state.position;
+    let left = (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
+        let b = candidates.tree.leaf(e);
+        let keep = DVec3::splat(radius[e] * 1.1);
+        let (lo, hi) = (b.lo + keep, b.hi - keep);
+        x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
+    });
+    let end = &mut candidates.turned[2];
+    turning(model, x, end);
+    left || candidates.straight.iter().enumerate().any(|(a, b)| end[*b] - end[a] > BENT)
 }
 
 /// Largest relative move of two points of the two elements.

@@ -1,6 +1,7 @@
 //! A binary tree of boxes over the elements in array order. Neighbors along a thread are neighbors in space, so the tree never needs
 //! sorting: it is refilled bottom up.
 
+use core::ops::Range;
 use glam::DVec3;
 
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +37,8 @@ pub(crate) struct Tree {
     nodes: Vec<Bounds>,
     leaves: usize,
     stack: Vec<(u32, u32)>,
+    /// Of pairs of nodes of one level, with the number of leaves under each.
+    pair_stack: Vec<(u32, u32, u32)>,
 }
 
 impl Tree {
@@ -56,27 +59,34 @@ impl Tree {
         &self.nodes[self.leaves - 1 + i]
     }
 
-    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves.
-    pub fn pairs(&mut self, mut found: impl FnMut(usize, usize)) {
-        let inner = self.leaves as u32 - 1;
-        self.stack.clear();
-        self.stack.push((0, 0));
-        while let Some((a, b)) = self.stack.pop() {
+    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves, except where `skip` says of a leaf range and one after it that none
+    /// of the pairs between them matters.
+    pub fn pairs(&mut self, skip: impl Fn(Range<usize>, Range<usize>) -> bool, mut found: impl FnMut(usize, usize)) {
+        let leaves = self.leaves as u32;
+        self.pair_stack.clear();
+        self.pair_stack.push((0, 0, leaves));
+        while let Some((a, b, size)) = self.pair_stack.pop() {
+            let half = size / 2;
             if a == b {
-                if a < inner {
-                    self.stack.extend([(2 * a + 1, 2 * a + 1), (2 * a + 2, 2 * a + 2), (2 * a + 1, 2 * a + 2)]);
+                if size > 1 {
+                    self.pair_stack.extend([(2 * a + 1, 2 * a + 1, half), (2 * a + 2, 2 * a + 2, half), (2 * a + 1, 2 * a + 2, half)]);
                 }
                 continue;
             }
             if !self.nodes[a as usize].overlaps(&self.nodes[b as usize]) {
                 continue;
             }
-            // Two different nodes are always of the same level.
-            if a >= inner {
-                found((a - inner) as usize, (b - inner) as usize);
+            // The level begins at node leaves / size - 1.
+            let under = |k: u32| ((k + 1) * size - leaves) as usize..((k + 2) * size - leaves) as usize;
+            let (i, j) = (under(a), under(b));
+            if skip(i.clone(), j.clone()) {
+                continue;
+            }
+            if size == 1 {
+                found(i.start, j.start);
             } else {
                 let (a, b) = (2 * a + 1, 2 * b + 1);
-                self.stack.extend([(a, b), (a, b + 1), (a + 1, b), (a + 1, b + 1)]);
+                self.pair_stack.extend([(a, b, half), (a, b + 1, half), (a + 1, b, half), (a + 1, b + 1, half)]);
             }
         }
     }
@@ -113,7 +123,18 @@ mod tests {
         let mut tree = Tree::default();
         tree.fill(boxes.len(), |i| boxes[i]);
         let mut got = Vec::new();
-        tree.pairs(|i, j| got.push((i, j)));
+        // The ranges handed to `skip` hold the pair.
+        let ranges = core::cell::Cell::new((0..0, 0..0));
+        tree.pairs(
+            |a, b| {
+                ranges.set((a, b));
+                false
+            },
+            |i, j| {
+                assert_eq!(ranges.take(), (i..i + 1, j..j + 1));
+                got.push((i, j));
+            },
+        );
         got.sort_unstable();
         let mut want = Vec::new();
         for i in 0..boxes.len() {

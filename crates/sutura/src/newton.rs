@@ -27,6 +27,9 @@ const OVERSHOOT: f64 = 0.5;
 /// Turn of an iteration over that of the one before beyond which a substep without contacts goes over to the exact matrix.
 const SLOW: f64 = 0.3;
 
+/// Part of the stiffness along a step that the positive matrix may have left out where its step is taken for the last one.
+const TRUSTED: f64 = 0.1;
+
 /// How a Newton solve ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
@@ -43,8 +46,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
-    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly
-    // gets there in two iterations, so the exact one has to wait until progress is slow.
+    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly is as
+    // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
     let mut before = f64::INFINITY;
@@ -85,11 +88,12 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         scratch.rows.sliders.couple(&mut scratch.step, true);
         row::thread::couple(state, scratch);
         gained = work(scratch);
+        let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
         apply(model, state, scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
-        if waiting && (out.turn > SLOW * before || !scratch.rows.is_empty()) {
+        if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
             (waiting, exact) = (false, true);
         }
         before = out.turn;
@@ -99,7 +103,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             out.finite = false;
             return out;
         }
-        let settled = out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
+        let settled = trusted && out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
         if scale >= 1.0 && settled && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
             out.converged = true;
             break;
@@ -188,6 +192,31 @@ fn limit(state: &State, scratch: &Scratch) -> f64 {
 #[inline]
 fn max_or_nan(a: f64, b: f64) -> f64 {
     if b <= a { a } else { b }
+}
+
+/// Whether the positive matrix leaves out too much of the exact one along the last step, over inertia and bending there. (Stretch and shear
+/// do not count: their rounding alone can outweigh a slow motion near buckling.)
+fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
+    let step = &scratch.step;
+    let (mut out, mut kept) = (0.0, 0.0);
+    for (rod, _) in &scratch.rods {
+        for e in rod.start..rod.end - 1 {
+            let turn = step[2 * e + 1];
+            let local = state.orientation[e].conjugate() * turn;
+            out -= model.rest_length[e] * local.z * local.truncate().dot(scratch.shear[e]);
+            if scratch.tension[e] < 0.0 {
+                let change = state.orientation[e].conjugate() * (step[2 * e + 2] - step[2 * e]);
+                out += scratch.tension[e] / model.rest_length[e] * change.truncate().length_squared();
+            }
+            kept += model.mass[e] / (h * h) * step[2 * e].length_squared();
+            if e > rod.start {
+                let before = step[2 * e - 1];
+                out += before.dot(scratch.moment[e].cross(turn));
+                kept += model.bend_stiffness[e].x * (turn - before).length_squared();
+            }
+        }
+    }
+    out.abs() > TRUSTED * kept
 }
 
 fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {

@@ -37,13 +37,11 @@ pub(crate) struct Clearance {
     pub shape: Option<f64>,
 }
 
-/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at least
-/// cos(1 / 2) = 0.87 of the arc between them apart.
+/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at least cos(1 / 2) = 0.87
+/// of the arc between them apart, 2.7 radii if they are no neighbors.
 const STRAIGHT: f64 = 1.0;
-/// Arc between two elements of such a piece, in radii, so that they are out of reach of each other, 0.87 x 5.8 > 5.
-const STRAIGHT_APART: f64 = 5.8;
-/// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(1) x 5.8 > 3.
-const BENT: f64 = 2.0;
+/// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(3 / 4) pi > 2.2.
+const BENT: f64 = 1.5;
 
 /// Total turning of the centerline `x` up to each element; from rod to rod it jumps.
 fn turning(model: &Model, x: &[DVec3], total: &mut Vec<f64>) {
@@ -106,7 +104,7 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
         Bounds::of(&[start[e], start[e + 1], state.position[e], state.position[e + 1]], grow)
     });
     threads.clear();
-    let skip = |a: Range<usize>, b: Range<usize>| straight[a.start] + 1 >= b.end.min(n) && arc[b.start] - arc[a.end] > STRAIGHT_APART * radius[a.start];
+    let skip = |leaves: Range<usize>| leaves.start >= n || straight[leaves.start] + 1 >= leaves.end.min(n);
     tree.pairs(skip, |a, b| {
         if !neighbors(model, arc, radius, a, b) {
             threads.push((a as u32, b as u32));

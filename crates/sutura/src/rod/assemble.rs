@@ -69,6 +69,7 @@ pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratc
         system.next[2 * e + 1] = own.kd.transpose();
         // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
         system.after[2 * e + 1] = next_kt.negated_with_skew(if exact { next_moment * 0.5 } else { DVec3::ZERO });
+        scratch.moment[e + 1] = next_moment;
         scratch.rhs[2 * e] = push + own.force;
         scratch.rhs[2 * e + 1] = spin.0 + scratch.torque[e] + own.torque + (next_moment - moment);
         (force, kx) = (own.force, own.kx);

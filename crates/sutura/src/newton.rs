@@ -174,7 +174,7 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
                 scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
             }
         }
-        assemble_blocks(model, state, scratch, h, Hessian::Positive, &rod.particles(), held);
+        assemble_blocks(model, state, scratch, h, &rod.particles(), held);
     }
     assemble_clamps(state, scratch, h);
     row::shape::assemble(model, state, scratch, h, false);

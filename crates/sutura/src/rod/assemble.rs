@@ -2,11 +2,13 @@
 
 use crate::math::log;
 use crate::model::Model;
+use crate::rod::lanes::{Quat2, Sym2, Vec2, join, lanes};
 use crate::rod::strain;
 use crate::scratch::{ClampJoint, Scratch};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
+use wide::f64x2;
 
 /// Which second derivatives of the elastic energy go into the matrix. The residual is exact in either case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,59 +23,38 @@ pub(crate) enum Hessian {
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian) {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
-        assemble_blocks(model, state, scratch, h, hessian, &rod, rod.clone());
+        let last = rod.end - 1;
+        let half = (last - rod.start) / 2;
+        let middle = rod.start + half;
+        let at = At { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: hessian == Hessian::Exact, last };
+        // The first half in the low lane, the second in the high one.
+        let mut carry = Carry::none();
+        if half > 0 {
+            carry = at.carry(scratch, middle - 1).scaled(lanes(0.0, 1.0));
+        }
+        for i in 0..half {
+            carry = at.block(scratch, rod.start + i, middle + i, &carry);
+        }
+        carry = carry.high();
+        if middle + half < last {
+            carry = at.block(scratch, last - 1, last - 1, &carry);
+        }
+        at.last_block(scratch, &carry);
     }
     assemble_clamps(state, scratch, h);
 }
 
-/// Rows of the particles and frames `blocks` of a rod, each written once.
-pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, rod: &Range<usize>, blocks: Range<usize>) {
-    let exact = hessian == Hessian::Exact;
-    let inv_h2 = 1.0 / (h * h);
+/// The residual and the Hessian without the clamps of the blocks `held` of a rod.
+pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &Range<usize>, held: Range<usize>) {
     let last = rod.end - 1;
-    // What the element and the joint before block e add to it.
-    let (mut force, mut kx) = (DVec3::ZERO, Sym::ZERO);
-    let (mut moment, mut kt) = (DVec3::ZERO, Sym::ZERO);
-    if blocks.start > rod.start {
-        let before = element(model, state, scratch, blocks.start - 1, exact);
-        (force, kx) = (before.force, before.kx);
-        if blocks.start < last && scratch.joint_on[blocks.start] {
-            (moment, kt) = joint_before(model, state, scratch, blocks.start, h);
-        }
-    }
-    for e in blocks {
-        let w = model.mass[e] * inv_h2;
-        let particle = Sym::scalar(w).plus(&kx);
-        let push = (scratch.target[e] - state.position[e]) * w + scratch.force[e] - force;
-        let system = &mut scratch.system;
+    let at = At { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, last };
+    let mut carry = if held.start > rod.start { at.carry(scratch, held.start - 1) } else { Carry::none() };
+    for e in held {
         if e == last {
-            system.diagonal[2 * e] = particle.matrix();
-            system.diagonal[2 * e + 1] = DMat3::IDENTITY;
-            for node in [2 * e, 2 * e + 1] {
-                system.next[node] = DMat3::ZERO;
-                system.after[node] = DMat3::ZERO;
-            }
-            scratch.rhs[2 * e] = push;
-            scratch.rhs[2 * e + 1] = DVec3::ZERO;
-            break;
+            at.last_block(scratch, &carry);
+        } else {
+            carry = at.block(scratch, e, e, &carry);
         }
-        let own = element(model, state, scratch, e, exact);
-        let spin = spin(model, state, scratch, e, inv_h2, own.axis);
-        let (next_moment, next_kt) =
-            if e + 1 < last && scratch.joint_on[e + 1] { joint_before(model, state, scratch, e + 1, h) } else { (DVec3::ZERO, Sym::ZERO) };
-        let system = &mut scratch.system;
-        system.diagonal[2 * e] = particle.plus(&own.kx).matrix();
-        system.next[2 * e] = -own.kd;
-        system.after[2 * e] = -own.kx.matrix();
-        system.diagonal[2 * e + 1] = spin.1.plus(&own.kt).plus(&kt).plus(&next_kt).matrix();
-        system.next[2 * e + 1] = own.kd.transpose();
-        // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
-        system.after[2 * e + 1] = next_kt.negated_with_skew(if exact { next_moment * 0.5 } else { DVec3::ZERO });
-        scratch.moment[e + 1] = next_moment;
-        scratch.rhs[2 * e] = push + own.force;
-        scratch.rhs[2 * e + 1] = spin.0 + scratch.torque[e] + own.torque + (next_moment - moment);
-        (force, kx) = (own.force, own.kx);
-        (moment, kt) = (next_moment, next_kt);
     }
 }
 
@@ -87,153 +68,210 @@ pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch, h: f64) {
     }
 }
 
+/// What the element and the joint before a block add to it: force on the element's first particle and moment on the joint's first frame, with
+/// their second derivatives.
+struct Carry {
+    force: Vec2,
+    kx: Sym2,
+    moment: Vec2,
+    kt: Sym2,
+}
+
+impl Carry {
+    fn none() -> Self {
+        let zero = Vec2::load(DVec3::ZERO, DVec3::ZERO);
+        Carry { force: zero, kx: Sym2::scalar(lanes(0.0, 0.0)), moment: zero, kt: Sym2::scalar(lanes(0.0, 0.0)) }
+    }
+    fn scaled(&self, k: f64x2) -> Self {
+        Carry { force: self.force.scaled(k), kx: self.kx.scaled(k), moment: self.moment.scaled(k), kt: self.kt.scaled(k) }
+    }
+    /// The high lane in both.
+    fn high(&self) -> Self {
+        let v = |v: &Vec2| Vec2::load(v.split().1, v.split().1);
+        let d = |x: f64x2| f64x2::splat(x.to_array()[1]);
+        let m = |m: &Sym2| Sym2 { xx: d(m.xx), yy: d(m.yy), zz: d(m.zz), xy: d(m.xy), xz: d(m.xz), yz: d(m.yz) };
+        Carry { force: v(&self.force), kx: m(&self.kx), moment: v(&self.moment), kt: m(&self.kt) }
+    }
+}
+
 /// What an element does to the particles at its ends and to its frame.
 struct Element {
     /// Third director.
-    axis: DVec3,
+    axis: Vec2,
     /// Force on the first particle, minus that on the second.
-    force: DVec3,
+    force: Vec2,
     /// Torque on the frame.
-    torque: DVec3,
+    torque: Vec2,
     /// Second derivatives: of the particles; of the first particle and the frame, with a minus; of the frame.
-    kx: Sym,
-    kd: DMat3,
-    kt: Sym,
+    kx: Sym2,
+    kd: [Vec2; 3],
+    kt: Sym2,
 }
 
-#[inline(always)]
-fn element(model: &Model, state: &State, scratch: &Scratch, e: usize, exact: bool) -> Element {
-    let r = DMat3::from_quat(state.orientation[e]);
-    let t = r.z_axis;
-    let d = state.position[e + 1] - state.position[e];
-    let l = model.rest_length[e];
-    // Shear stiffness is the same in both directions: R K R^T = a I + b t t^T.
-    let k = model.stretch_stiffness[e];
-    let (a, b) = (k.x, k.z - k.x);
-    let along = t.dot(d);
-    let carried = scratch.tension[e];
-    let multiplier = if model.inextensible[e] { carried } else { 0.0 };
-    let force = (d - t * along) * a + t * (k.z * (along - l) + multiplier);
-    // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
-    // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
-    let g = if exact { carried } else { carried.max(0.0) } / l;
-    // With n = t x d: R K R^T [d]x = a [d]x + b t n^T, and [d]x^T R K R^T [d]x = a (d^2 I - d d^T) + b n n^T.
-    let n = t.cross(d);
-    let (bn, ad) = (n * b, d * a);
-    let kd = DMat3::from_cols(
-        DVec3::new(t.x * bn.x, t.y * bn.x + ad.z, t.z * bn.x - ad.y),
-        DVec3::new(t.x * bn.y - ad.z, t.y * bn.y, t.z * bn.y + ad.x),
-        DVec3::new(t.x * bn.z + ad.y, t.y * bn.z - ad.x, t.z * bn.z),
-    );
-    let mut kt = Sym::scalar(a * d.length_squared()).square(d, -a).square(n, b);
-    if exact {
-        let shear = (r.x_axis * scratch.shear[e].x + r.y_axis * scratch.shear[e].y) * (0.5 * l);
-        kt = kt.less_product(shear, t);
+/// Where it is assembled.
+struct At<'a> {
+    model: &'a Model,
+    state: &'a State,
+    inv_h2: f64,
+    inv_h: f64,
+    exact: bool,
+    /// Last particle of the rod.
+    last: usize,
+}
+
+impl At<'_> {
+    /// Writes the rows of two blocks, neither of them the last of the rod.
+    #[inline(always)]
+    fn block(&self, scratch: &mut Scratch, low: usize, high: usize, before: &Carry) -> Carry {
+        let own = self.element(scratch, low, high);
+        let (inertial, inertia) = self.spin(scratch, low, high, &own.axis);
+        let (moment, kt) = self.joint(scratch, low + 1, high + 1);
+        let (model, state) = (self.model, self.state);
+        let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2);
+        let off = Vec2::load(scratch.target[low], scratch.target[high]).less(&Vec2::load(state.position[low], state.position[high]));
+        let push = Vec2::load(scratch.force[low], scratch.force[high]).plus(&off, w).less(&before.force).add(&own.force);
+        let torque = Vec2::load(scratch.torque[low], scratch.torque[high]).add(&inertial).add(&own.torque).add(&moment.less(&before.moment));
+        let none = Vec2::load(DVec3::ZERO, DVec3::ZERO);
+        let half = if self.exact { moment.scaled(f64x2::splat(0.5)) } else { none };
+        (scratch.moment[low + 1], scratch.moment[high + 1]) = moment.split();
+        let (x, t) = ((2 * low, 2 * high), (2 * low + 1, 2 * high + 1));
+        (scratch.rhs[x.0], scratch.rhs[x.1]) = push.split();
+        (scratch.rhs[t.0], scratch.rhs[t.1]) = torque.split();
+        let system = &mut scratch.system;
+        (system.diagonal[x.0], system.diagonal[x.1]) = before.kx.add(&own.kx).add(&Sym2::scalar(w)).split();
+        let (a, b) = join(own.kd);
+        (system.next[x.0], system.next[x.1]) = (-a, -b);
+        (system.next[t.0], system.next[t.1]) = (a.transpose(), b.transpose());
+        (system.after[x.0], system.after[x.1]) = own.kx.skew_less(&none);
+        (system.diagonal[t.0], system.diagonal[t.1]) = inertia.add(&own.kt).add(&before.kt).add(&kt).split();
+        // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
+        (system.after[t.0], system.after[t.1]) = kt.skew_less(&half);
+        Carry { force: own.force, kx: own.kx, moment, kt }
     }
-    Element { axis: t, force, torque: d.cross(force), kx: Sym::scalar(a + g).square(t, b - g), kd, kt }
-}
 
-/// Inertial torque on a frame whose third director is `t`, and spin inertia in world axes over h^2. The change of the latter with the frame
-/// (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
-#[inline(always)]
-fn spin(model: &Model, state: &State, scratch: &Scratch, e: usize, inv_h2: f64, t: DVec3) -> (DVec3, Sym) {
-    let q = state.orientation[e];
-    let i = model.inertia[e] * inv_h2;
-    let off = log(scratch.target_frame[e] * q.conjugate());
-    let mut torque = off * i.x + t * ((i.z - i.x) * t.dot(off));
-    let mut inertia = Sym::scalar(i.x).square(t, i.z - i.x);
-    // Only what is attached has different moments across.
-    if i.y != i.x {
-        let y = q * DVec3::Y;
-        torque += y * ((i.y - i.x) * y.dot(off));
-        inertia = inertia.square(y, i.y - i.x);
+    /// Writes the rows of the last block, which has no element of its own.
+    fn last_block(&self, scratch: &mut Scratch, before: &Carry) {
+        let e = self.last;
+        let w = self.model.mass[e] * self.inv_h2;
+        let system = &mut scratch.system;
+        system.diagonal[2 * e] = before.kx.add(&Sym2::scalar(f64x2::splat(w))).split().1;
+        system.diagonal[2 * e + 1] = DMat3::IDENTITY;
+        for node in [2 * e, 2 * e + 1] {
+            system.next[node] = DMat3::ZERO;
+            system.after[node] = DMat3::ZERO;
+        }
+        scratch.rhs[2 * e] = (scratch.target[e] - self.state.position[e]) * w + scratch.force[e] - before.force.split().1;
+        scratch.rhs[2 * e + 1] = DVec3::ZERO;
     }
-    (torque, inertia)
+
+    /// What element `e` hands on to the block after it.
+    fn carry(&self, scratch: &Scratch, e: usize) -> Carry {
+        let own = self.element(scratch, e, e);
+        let (moment, kt) = self.joint(scratch, e + 1, e + 1);
+        Carry { force: own.force, kx: own.kx, moment, kt }
+    }
+
+    #[inline(always)]
+    fn element(&self, scratch: &Scratch, low: usize, high: usize) -> Element {
+        let (model, state) = (self.model, self.state);
+        let [r1, r2, t] = Quat2::load(state.orientation[low], state.orientation[high]).axes();
+        let x = &state.position;
+        let d = Vec2::load(x[low + 1], x[high + 1]).less(&Vec2::load(x[low], x[high]));
+        let l = lanes(model.rest_length[low], model.rest_length[high]);
+        // Shear stiffness is the same in both directions: R K R^T = a I + b t t^T.
+        let (k0, k1) = (model.stretch_stiffness[low], model.stretch_stiffness[high]);
+        let (a, c) = (lanes(k0.x, k1.x), lanes(k0.z, k1.z));
+        let b = c - a;
+        let along = t.dot(&d);
+        let (t0, t1) = (scratch.tension[low], scratch.tension[high]);
+        let multiplier = |e: usize, t: f64| if model.inextensible[e] { t } else { 0.0 };
+        let pull = c * (along - l) + lanes(multiplier(low, t0), multiplier(high, t1));
+        let force = d.plus(&t, -along).scaled(a).plus(&t, pull);
+        // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
+        // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
+        let g = if self.exact { lanes(t0, t1) } else { lanes(t0.max(0.0), t1.max(0.0)) } / l;
+        // With n = t x d: R K R^T [d]x = a [d]x + b t n^T, and [d]x^T R K R^T [d]x = a (d^2 I - d d^T) + b n n^T.
+        let n = t.cross(&d);
+        let (bn, ad) = (n.scaled(b), d.scaled(a));
+        let kd = [
+            Vec2 { x: t.x * bn.x, y: t.y * bn.x + ad.z, z: t.z * bn.x - ad.y },
+            Vec2 { x: t.x * bn.y - ad.z, y: t.y * bn.y, z: t.z * bn.y + ad.x },
+            Vec2 { x: t.x * bn.z + ad.y, y: t.y * bn.z - ad.x, z: t.z * bn.z },
+        ];
+        let mut kt = Sym2::scalar(a * d.dot(&d)).square(&d, -a).square(&n, b);
+        if self.exact {
+            let (s0, s1) = (scratch.shear[low], scratch.shear[high]);
+            let half = l * f64x2::splat(0.5);
+            let shear = r1.scaled(lanes(s0.x, s1.x) * half).plus(&r2, lanes(s0.y, s1.y) * half);
+            kt = kt.less_product(&shear, &t);
+        }
+        Element { axis: t, force, torque: d.cross(&force), kx: Sym2::scalar(a + g).square(&t, b - g), kd, kt }
+    }
+
+    /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the latter with the frame
+    /// (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
+    #[inline(always)]
+    fn spin(&self, scratch: &Scratch, low: usize, high: usize, t: &Vec2) -> (Vec2, Sym2) {
+        let q = &self.state.orientation;
+        let (i0, i1) = (self.model.inertia[low] * self.inv_h2, self.model.inertia[high] * self.inv_h2);
+        let (x, z) = (lanes(i0.x, i1.x), lanes(i0.z, i1.z) - lanes(i0.x, i1.x));
+        let turn = Quat2::load(scratch.target_frame[low], scratch.target_frame[high]).times(&Quat2::load(q[low], q[high]).conjugate());
+        let (u0, u1) = turn.split();
+        let off = Vec2::load(log(u0), log(u1));
+        let mut torque = off.scaled(x).plus(t, z * t.dot(&off));
+        let mut inertia = Sym2::scalar(x).square(t, z);
+        // Only what is attached has different moments across.
+        if i0.x != i0.y || i1.x != i1.y {
+            let y = Vec2::load(q[low] * DVec3::Y, q[high] * DVec3::Y);
+            let more = lanes(i0.y, i1.y) - x;
+            torque = torque.plus(&y, more * y.dot(&off));
+            inertia = inertia.square(&y, more);
+        }
+        (torque, inertia)
+    }
+
+    /// Moments that the joints before two elements exert on the frames before them, and the stiffness against relative rotation; none where
+    /// there is no joint.
+    #[inline(always)]
+    fn joint(&self, scratch: &Scratch, low: usize, high: usize) -> (Vec2, Sym2) {
+        let (model, state) = (self.model, self.state);
+        let q = &state.orientation;
+        let on = |e: usize| if e < self.last && scratch.joint_on[e] { 1.0 } else { 0.0 };
+        let (half0, half1) = (model.rest_half[low], model.rest_half[high]);
+        let j = strain::joints([q[low - 1], q[high - 1]], [q[low], q[high]], [half0, half1]);
+        let (k0, k1) = (model.bend_stiffness[low] * on(low), model.bend_stiffness[high] * on(high));
+        let gamma = lanes(model.bend_damping[low], model.bend_damping[high]) * f64x2::splat(self.inv_h);
+        let plastic = Vec2::load(state.plastic[low], state.plastic[high]);
+        joint_terms(&j, &plastic, &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]), &Vec2::load(k0, k1), gamma)
+    }
 }
 
-/// Moment that the joint before element `e` exerts on the frame before it, and the stiffness against relative rotation.
+/// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation. Bending stiffness is the same
+/// in both directions.
 #[inline(always)]
-fn joint_before(model: &Model, state: &State, scratch: &Scratch, e: usize, h: f64) -> (DVec3, Sym) {
-    let j = strain::joint(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
-    joint_terms(&j, state.plastic[e], scratch.start_angle[e], model.bend_stiffness[e], model.bend_damping[e], h)
-}
-
-/// Moment in world axes that the joint exerts on its first frame, and the stiffness against relative rotation. Bending stiffness is the
-/// same in both directions.
-#[inline(always)]
-fn joint_terms(j: &strain::Joint, plastic: DVec3, start: DVec3, stiffness: DVec3, damping: f64, h: f64) -> (DVec3, Sym) {
-    let gamma = damping / h;
-    let moment = stiffness * ((j.angle - plastic) + (j.angle - start) * gamma);
-    let (bend, twist) = (stiffness.x * (1.0 + gamma), stiffness.z * (1.0 + gamma));
+fn joint_terms(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec2, gamma: f64x2) -> (Vec2, Sym2) {
+    let one = f64x2::splat(1.0);
+    let moment = j.angle.less(plastic).plus(&j.angle.less(start), gamma).times(stiffness);
+    let (bend, twist) = (stiffness.x * (one + gamma), stiffness.z * (one + gamma));
     // With the derivative M R^T, M = s I - c theta theta^T: M M = s^2 I - (2 s c - c^2 theta^2) theta theta^T.
-    let (s, c) = (1.0 + j.c * j.squared, j.c);
-    let w = j.middle * j.angle;
-    let axis = j.middle.z_axis * s - w * (c * j.angle.z);
-    let b = Sym::scalar(bend * s * s).square(w, bend * c * (c * j.squared - 2.0 * s)).square(axis, twist - bend);
-    (j.middle * (moment * s) - w * (c * j.angle.dot(moment)), b)
+    let c = j.c;
+    let cc = c * j.squared;
+    let s = one + cc;
+    let [m1, m2, m3] = &j.middle;
+    let w = m1.scaled(j.angle.x).plus(m2, j.angle.y).plus(m3, j.angle.z);
+    let axis = m3.scaled(s).plus(&w, -(c * j.angle.z));
+    let b = Sym2::scalar(bend * s * s).square(&w, bend * c * (cc - (s + s))).square(&axis, twist - bend);
+    let turned = m1.scaled(moment.x).plus(m2, moment.y).plus(m3, moment.z);
+    (turned.scaled(s).plus(&w, -(c * j.angle.dot(&moment))), b)
 }
 
 /// The same for a clamp. The moment is that on the first of the two.
 pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat, h: f64) -> (DVec3, DMat3) {
-    let j = if c.first { strain::joint(c.orientation, q, c.rest_half) } else { strain::joint(q, c.orientation, c.rest_half) };
-    let (moment, b) = joint_terms(&j, DVec3::ZERO, c.start, c.stiffness, c.damping, h);
-    (moment, b.matrix())
-}
-
-/// A symmetric 3x3 matrix.
-#[derive(Debug, Clone, Copy)]
-struct Sym {
-    xx: f64,
-    yy: f64,
-    zz: f64,
-    xy: f64,
-    xz: f64,
-    yz: f64,
-}
-
-impl Sym {
-    const ZERO: Sym = Sym { xx: 0.0, yy: 0.0, zz: 0.0, xy: 0.0, xz: 0.0, yz: 0.0 };
-
-    /// `s I`.
-    #[inline(always)]
-    fn scalar(s: f64) -> Self {
-        Sym { xx: s, yy: s, zz: s, ..Sym::ZERO }
-    }
-    /// `self + k v v^T`.
-    #[inline(always)]
-    fn square(self, v: DVec3, k: f64) -> Self {
-        let w = v * k;
-        self.plus(&Sym { xx: v.x * w.x, yy: v.y * w.y, zz: v.z * w.z, xy: v.x * w.y, xz: v.x * w.z, yz: v.y * w.z })
-    }
-    /// `self - a b^T - b a^T`.
-    #[inline(always)]
-    fn less_product(self, a: DVec3, b: DVec3) -> Self {
-        Sym {
-            xx: self.xx - 2.0 * (a.x * b.x),
-            yy: self.yy - 2.0 * (a.y * b.y),
-            zz: self.zz - 2.0 * (a.z * b.z),
-            xy: self.xy - (a.x * b.y + a.y * b.x),
-            xz: self.xz - (a.x * b.z + a.z * b.x),
-            yz: self.yz - (a.y * b.z + a.z * b.y),
-        }
-    }
-    #[inline(always)]
-    fn plus(self, o: &Sym) -> Self {
-        Sym { xx: self.xx + o.xx, yy: self.yy + o.yy, zz: self.zz + o.zz, xy: self.xy + o.xy, xz: self.xz + o.xz, yz: self.yz + o.yz }
-    }
-    #[inline(always)]
-    fn matrix(&self) -> DMat3 {
-        DMat3::from_cols(DVec3::new(self.xx, self.xy, self.xz), DVec3::new(self.xy, self.yy, self.yz), DVec3::new(self.xz, self.yz, self.zz))
-    }
-    /// `[v]x - self`.
-    #[inline(always)]
-    fn negated_with_skew(&self, v: DVec3) -> DMat3 {
-        DMat3::from_cols(
-            DVec3::new(-self.xx, v.z - self.xy, -v.y - self.xz),
-            DVec3::new(-v.z - self.xy, -self.yy, v.x - self.yz),
-            DVec3::new(v.y - self.xz, -v.x - self.yz, -self.zz),
-        )
-    }
+    let (q0, q1) = if c.first { (c.orientation, q) } else { (q, c.orientation) };
+    let j = strain::joints([q0; 2], [q1; 2], [c.rest_half; 2]);
+    let twice = |v: DVec3| Vec2::load(v, v);
+    let (moment, b) = joint_terms(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping / h));
+    (moment.split().0, b.split().0)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@
 //! Elimination runs from both ends of a rod toward a zone of blocks `[lo, hi]` (a block is x_i with theta_i) and then through the
 //! zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone alone.
 
+use crate::rod::lanes::{Vec2, lanes};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 use wide::f64x2;
@@ -373,41 +374,7 @@ fn both(blocks: &Range<usize>, zone: &Range<usize>) -> usize {
     (2 * (zone.start - blocks.start).min(blocks.end - zone.end)).saturating_sub(2)
 }
 
-/// Two vectors in the lanes of one, of the low end and of the high end.
-#[derive(Clone, Copy)]
-struct Vec2 {
-    x: f64x2,
-    y: f64x2,
-    z: f64x2,
-}
-
-#[inline(always)]
-fn lanes(low: f64, high: f64) -> f64x2 {
-    f64x2::new([low, high])
-}
-
 impl Vec2 {
-    #[inline(always)]
-    fn load(low: DVec3, high: DVec3) -> Self {
-        Vec2 { x: lanes(low.x, high.x), y: lanes(low.y, high.y), z: lanes(low.z, high.z) }
-    }
-    #[inline(always)]
-    fn split(&self) -> (DVec3, DVec3) {
-        let (x, y, z) = (self.x.to_array(), self.y.to_array(), self.z.to_array());
-        (DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]))
-    }
-    #[inline(always)]
-    fn times(&self, o: &Vec2) -> Vec2 {
-        Vec2 { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
-    }
-    #[inline(always)]
-    fn less(&self, o: &Vec2) -> Vec2 {
-        Vec2 { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
-    }
-    #[inline(always)]
-    fn dot(&self, o: &Vec2) -> f64x2 {
-        self.x * o.x + self.y * o.y + self.z * o.z
-    }
     /// `self - a^T v`.
     #[inline(always)]
     fn less_t_vec(&self, a: &Mat2, v: &Vec2) -> Vec2 {

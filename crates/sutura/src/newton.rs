@@ -131,7 +131,7 @@ fn work(scratch: &Scratch) -> f64 {
 }
 
 /// Assembles and factors. False when a pivot is not positive.
-fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
+pub(crate) fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
     row::shape::assemble(model, state, scratch, h, first);
     restrict(state, scratch);
@@ -242,13 +242,17 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
 
 /// Largest |elongation| of an inextensible element: a second-order error of the turn that Newton just made.
 fn inextensible_error(model: &Model, state: &State) -> f64 {
-    let mut worst = 0.0;
+    // Least and largest square of length over rest length.
+    let (mut least, mut most) = (1.0, 1.0);
     for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {
         for e in rod.elements() {
-            worst = max_or_nan(worst, ((state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0).abs());
+            let l = model.rest_length[e];
+            let ratio = (state.position[e + 1] - state.position[e]).length_squared() / (l * l);
+            least = if ratio >= least { least } else { ratio };
+            most = max_or_nan(most, ratio);
         }
     }
-    worst
+    (1.0 - f64::sqrt(least)).max(f64::sqrt(most) - 1.0)
 }
 
 fn largest_move(model: &Model, scratch: &Scratch, scale: f64) -> (f64, f64) {

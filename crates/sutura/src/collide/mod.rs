@@ -8,11 +8,13 @@ pub(crate) use shape::Collider;
 
 use crate::model::Model;
 use crate::params;
+use crate::rod::lanes::Vec2;
 use crate::scratch::Scratch;
 use crate::state::State;
 use core::ops::Range;
 use glam::DVec3;
 use tree::{Bounds, Tree};
+use wide::f64x2;
 
 /// Pairs that may touch in the substep, in array order.
 #[derive(Default)]
@@ -24,8 +26,8 @@ pub(crate) struct Candidates {
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
     tree: Tree,
-    /// Total turning of the centerline up to each element \[rad\], at the start of the substep, at the iterate, and when it was judged.
-    turned: [Vec<f64>; 3],
+    /// Total turning of the centerline up to each element \[rad\], at the start of the substep and at the iterate.
+    turned: Vec<[f64; 2]>,
     /// The last element up to which a thread is nearly straight from each element on, at the start and at the iterate.
     straight: Vec<usize>,
 }
@@ -43,25 +45,27 @@ const STRAIGHT: f64 = 1.0;
 /// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(3 / 4) pi > 2.2.
 const BENT: f64 = 1.5;
 
-/// Total turning of the centerline `x` up to each element; from rod to rod it jumps.
-fn turning(model: &Model, x: &[DVec3], total: &mut Vec<f64>) {
+/// Total turning of two centerlines up to each element; from rod to rod it jumps.
+fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
     total.clear();
-    let (mut sum, mut before) = (0.0, None::<DVec3>);
+    let one = f64x2::splat(1.0);
+    let (mut sum, mut before) = (f64x2::splat(0.0), None::<Vec2>);
     for e in 0..model.mass.len() {
         if !model.is_element(e) {
-            sum += 10.0 * BENT;
+            sum += f64x2::splat(10.0 * BENT);
             before = None;
         } else {
-            let d = x[e + 1] - x[e];
-            let t = d * (1.0 / d.length());
+            let d = Vec2::load(x[0][e + 1], x[1][e + 1]).less(&Vec2::load(x[0][e], x[1][e]));
+            let t = d.scaled(one / d.dot(&d).sqrt());
             if let Some(b) = before {
-                // The angle of unit vectors whose difference is c: 2 asin(c / 2) <= c + c^3 / 7 as c <= 2. Not a number for a point that is not.
-                let c2 = (t - b).length_squared();
-                sum += c2.sqrt() * (1.0 + c2 / 7.0);
+                // The angle of unit vectors whose difference is c: 2 asin(c / 2) <= c + c^3 / 7 as c <= 2.
+                let c = t.less(&b);
+                let c2 = c.dot(&c);
+                sum += c2.sqrt() * (one + c2 * f64x2::splat(1.0 / 7.0));
             }
             before = Some(t);
         }
-        total.push(sum);
+        total.push(sum.to_array());
     }
 }
 
@@ -84,14 +88,12 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
         let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
         arc.push(s);
     }
-    let [at_start, now, _] = turned;
-    turning(model, start, at_start);
-    turning(model, &state.position, now);
+    turning(model, [start, &state.position], turned);
     straight.clear();
     let mut last = 0;
     for e in 0..n {
         last = last.max(e);
-        while last + 1 < n && at_start[last + 1] - at_start[e] <= STRAIGHT && now[last + 1] - now[e] <= STRAIGHT {
+        while last + 1 < n && [0, 1].iter().all(|k| turned[last + 1][*k] - turned[e][*k] <= STRAIGHT) {
             last += 1;
         }
         straight.push(last);
@@ -194,9 +196,12 @@ fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
         let (lo, hi) = (b.lo + keep, b.hi - keep);
         x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
     });
-    let end = &mut candidates.turned[2];
-    turning(model, x, end);
-    left || candidates.straight.iter().enumerate().any(|(a, b)| end[*b] - end[a] > BENT)
+    left || {
+        // Both lanes the same: there is one centerline to look at.
+        turning(model, [x, x], &mut candidates.turned);
+        let end = &candidates.turned;
+        candidates.straight.iter().enumerate().any(|(a, b)| end[*b][0] - end[a][0] > BENT)
+    }
 }
 
 /// Largest relative move of two points of the two elements.

@@ -5,14 +5,14 @@ use wide::f64x2;
 
 /// Two vectors in the lanes of one.
 #[derive(Clone, Copy)]
-pub(super) struct Vec2 {
+pub(crate) struct Vec2 {
     pub x: f64x2,
     pub y: f64x2,
     pub z: f64x2,
 }
 
 #[inline(always)]
-pub(super) fn lanes(low: f64, high: f64) -> f64x2 {
+pub(crate) fn lanes(low: f64, high: f64) -> f64x2 {
     f64x2::new([low, high])
 }
 
@@ -59,7 +59,7 @@ impl Vec2 {
 
 /// Two quaternions in the lanes of one.
 #[derive(Clone, Copy)]
-pub(super) struct Quat2 {
+pub(crate) struct Quat2 {
     pub v: Vec2,
     pub w: f64x2,
 }
@@ -100,7 +100,7 @@ impl Quat2 {
 
 /// Two symmetric matrices in the lanes of one.
 #[derive(Clone, Copy)]
-pub(super) struct Sym2 {
+pub(crate) struct Sym2 {
     pub xx: f64x2,
     pub yy: f64x2,
     pub zz: f64x2,
@@ -160,7 +160,7 @@ impl Sym2 {
 
 /// The two matrices with these columns.
 #[inline(always)]
-pub(super) fn join(cols: [Vec2; 3]) -> (DMat3, DMat3) {
+pub(crate) fn join(cols: [Vec2; 3]) -> (DMat3, DMat3) {
     let [(xl, xh), (yl, yh), (zl, zh)] = cols.each_ref().map(Vec2::split);
     (DMat3::from_cols(xl, yl, zl), DMat3::from_cols(xh, yh, zh))
 }

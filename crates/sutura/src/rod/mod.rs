@@ -2,7 +2,7 @@
 
 pub(crate) mod assemble;
 pub(crate) mod factor;
-mod lanes;
+pub(crate) mod lanes;
 pub(crate) mod strain;
 pub(crate) mod torque;
 

@@ -230,3 +230,54 @@ fn passes(from: &[DVec3], to: &[DVec3], a: usize, b: usize, least: f64) -> bool 
     }
     true
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Material, RodSpec, World};
+
+    /// A straight thread of 100 elements of one radius each, at the start of a substep in which nothing moves.
+    fn straight_thread() -> (Model, State, Scratch, f64) {
+        let r = 1e-4;
+        let mut world = World::default();
+        world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (100.0 * r), 100, r, Material::elastic(1e9, 1000.0))).unwrap();
+        let (model, state) = world.into_parts();
+        let mut scratch = Scratch::default();
+        scratch.fit(&model);
+        scratch.start.copy_from_slice(&state.position);
+        (model, state, scratch, r)
+    }
+
+    #[test]
+    fn a_straight_thread_has_no_candidates_and_a_fold_of_it_is_found_after_all() {
+        let (model, mut state, mut scratch, r) = straight_thread();
+        detect(&model, &state, &mut scratch);
+        assert!(scratch.candidates.threads.is_empty());
+        assert!(sweep(&model, &state, &mut scratch).is_ok());
+        // The second half back along the first, one radius beside it.
+        for i in 51..=100 {
+            state.position[i] = state.position[100 - i] + DVec3::Y * r;
+        }
+        assert!(sweep(&model, &state, &mut scratch).is_err());
+    }
+
+    #[test]
+    fn only_pieces_that_bend_are_searched() {
+        let (model, mut state, mut scratch, r) = straight_thread();
+        // A hairpin of radius 2 r in the middle.
+        let turn = 7;
+        for i in 50..=100 {
+            let angle = (f64::from(i as u32 - 50) / f64::from(turn)).min(1.0) * core::f64::consts::PI;
+            state.position[i] = state.position[50] + DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) * (2.0 * r);
+            if i > 50 + turn as usize {
+                state.position[i] -= DVec3::X * (r * (i - 50 - turn as usize) as f64);
+            }
+        }
+        scratch.start.copy_from_slice(&state.position);
+        detect(&model, &state, &mut scratch);
+        let pairs = &scratch.candidates.threads;
+        // The legs are 4 r apart, so each element of one is in reach of some of the other; no pair lies within one leg.
+        assert!(pairs.iter().all(|(a, b)| *b >= 50 && *a < 57), "{pairs:?}");
+        assert!((10..50).all(|a| pairs.iter().any(|(x, _)| *x == a)));
+    }
+}

@@ -7,6 +7,8 @@ pub mod audit;
 mod collide;
 pub mod error;
 pub mod handle;
+#[doc(hidden)]
+pub mod kernels;
 pub mod knot;
 pub mod math;
 mod model;

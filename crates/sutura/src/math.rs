@@ -58,11 +58,25 @@ impl Pose {
 #[inline]
 pub fn exp(phi: DVec3) -> DQuat {
     let a2 = phi.length_squared();
-    // Below 1e-3 rad^2 the series to a^6 is exact to the last bit; it also avoids 0/0.
+    // Series that are exact to the last bit while a^2 is below 1e-3, and below 1; they also avoid 0/0.
     let (s, c) = if a2 < 1e-3 {
         let s = 0.5 - a2 * (1.0 / 48.0 - a2 * (1.0 / 3840.0 - a2 / 645_120.0));
         let c = 1.0 - a2 * (0.125 - a2 * (1.0 / 384.0 - a2 * (1.0 / 46_080.0 - a2 / 10_321_920.0)));
         (s, c)
+    } else if a2 < 1.0 {
+        // sin x / x and cos x of x = a / 2; the first terms left out are x^16 / 17! and x^18 / 18!, with x^2 < 1/4.
+        let u = 0.25 * a2;
+        let s = 1.0
+            - u * (1.0 / 6.0
+                - u * (1.0 / 120.0
+                    - u * (1.0 / 5040.0 - u * (1.0 / 362_880.0 - u * (1.0 / 39_916_800.0 - u * (1.0 / 6_227_020_800.0 - u / 1_307_674_368_000.0))))));
+        let c = 1.0
+            - u * (0.5
+                - u * (1.0 / 24.0
+                    - u * (1.0 / 720.0
+                        - u * (1.0 / 40_320.0
+                            - u * (1.0 / 3_628_800.0 - u * (1.0 / 479_001_600.0 - u * (1.0 / 87_178_291_200.0 - u / 20_922_789_888_000.0)))))));
+        (0.5 * s, c)
     } else {
         let a = a2.sqrt();
         let (sin, cos) = libm::sincos(0.5 * a);
@@ -77,16 +91,44 @@ pub fn log(q: DQuat) -> DVec3 {
     let v = DVec3::new(q.x, q.y, q.z);
     let s2 = v.length_squared();
     let w = q.w.abs();
-    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     // 2 atan(s/w)/s as a series in (s/w)^2 while that is small.
     let k = if s2 < 1e-3 * w * w {
         let u = s2 / (w * w);
         2.0 / w * (1.0 - u * (1.0 / 3.0 - u * (0.2 - u * (1.0 / 7.0 - u * (1.0 / 9.0 - u / 11.0)))))
     } else {
+        angle_over_sine(s2, w)
+    };
+    v * k.copysign(q.w)
+}
+
+/// 2 atan(s / w) / s for w >= 0: rotation angle over the length of a quaternion's vector part.
+#[inline]
+fn angle_over_sine(s2: f64, w: f64) -> f64 {
+    // tan of a quarter of the angle.
+    let r = (s2 + w * w).sqrt() + w;
+    let u = s2 / (r * r);
+    if u < 0.0157 {
+        // 4 atan(x) / x to half a radian; the first term left out is x^18 / 19 with x^2 = u.
+        let (u2, v) = (u * u, 1.0 / r);
+        let even = 1.0 + u2 * (0.2 + u2 * (1.0 / 9.0 + u2 * (1.0 / 13.0 + u2 * (1.0 / 17.0))));
+        let odd = 1.0 / 3.0 + u2 * (1.0 / 7.0 + u2 * (1.0 / 11.0 + u2 * (1.0 / 15.0)));
+        4.0 * v * (even - u * odd)
+    } else {
         let s = s2.sqrt();
         2.0 * libm::atan2(s, w) / s
-    };
-    v * (k * sign)
+    }
+}
+
+/// Rotation vector of `q`, half its length over its sine, and the rotation by half of it.
+#[inline(always)]
+pub(crate) fn log_and_root(q: DQuat) -> (DVec3, f64, DQuat) {
+    let v = DVec3::new(q.x, q.y, q.z) * 1.0_f64.copysign(q.w);
+    let w = q.w.abs();
+    let k = angle_over_sine(v.length_squared(), w);
+    // cos^2 (a / 2) = (1 + cos a) / 2.
+    let c = (0.5 + 0.5 * w).sqrt();
+    let s = 0.5 / c;
+    (v * k, 0.5 * k, DQuat::from_xyzw(v.x * s, v.y * s, v.z * s, c))
 }
 
 /// Matrix of the cross product: `skew(a) * b = a x b`.

@@ -80,7 +80,10 @@ pub(crate) struct Scratch {
     pub step: Vec<DVec3>,
     /// Predicted tension after the current iteration, for geometric stiffness.
     pub tension: Vec<f64>,
+    /// Predicted shear force along the first two directors, likewise.
     pub shear: Vec<DVec2>,
+    /// Moment of the joint before each element on the element before it, in world axes.
+    pub moment: Vec<DVec3>,
 
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
@@ -107,6 +110,7 @@ impl Scratch {
         self.step.resize(2 * n, DVec3::ZERO);
         self.tension.resize(n, 0.0);
         self.shear.resize(n, DVec2::ZERO);
+        self.moment.resize(n, DVec3::ZERO);
         self.radius.clear();
         self.radius.extend(model.rod_of.iter().map(|r| model.rods.at(*r).map_or(0.0, |r| r.radius)));
         self.rods.clear();

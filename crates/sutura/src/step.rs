@@ -51,7 +51,6 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     row::shape::begin(model, state, scratch);
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
-    if std::env::var("DBG").is_ok() { eprintln!("t {t:.6} h {h:.3e} depth {depth} {outcome:?}"); }
     let verdict = if !outcome.finite {
         Err("not finite")
     } else if !outcome.converged && depth < model.settings.halvings {
@@ -172,7 +171,8 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             scratch.target[i] = state.position[i];
         }
         for e in rod.start..rod.end - 1 {
-            if e > rod.start {
+            // Only damping asks for it.
+            if e > rod.start && model.bend_damping[e] != 0.0 {
                 scratch.start_angle[e] = crate::rod::strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
             }
         }
@@ -323,7 +323,7 @@ fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
             Hold::Pin => {}
             Hold::Clamp => {
                 for c in scratch.clamps.iter().filter(|c| c.grip == slot) {
-                    let (moment, _) = newton::clamp_terms(c, state.orientation[c.frame as usize], h);
+                    let (moment, _) = crate::rod::assemble::clamp_terms(c, state.orientation[c.frame as usize], h);
                     grip.torque += if c.first { -moment } else { moment };
                 }
             }

@@ -558,7 +558,6 @@ impl World {
         crate::snapshot::hash(&self.state)
     }
 
-    #[cfg(test)]
     pub(crate) fn into_parts(self) -> (Model, State) {
         (self.model, self.state)
     }

@@ -8,10 +8,13 @@ pub(crate) use shape::Collider;
 
 use crate::model::Model;
 use crate::params;
+use crate::rod::lanes::Vec2;
 use crate::scratch::Scratch;
 use crate::state::State;
+use core::ops::Range;
 use glam::DVec3;
 use tree::{Bounds, Tree};
+use wide::f64x2;
 
 /// Pairs that may touch in the substep, in array order.
 #[derive(Default)]
@@ -23,6 +26,10 @@ pub(crate) struct Candidates {
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
     tree: Tree,
+    /// Total turning of the centerline up to each element \[rad\], at the start of the substep and at the iterate.
+    turned: Vec<[f64; 2]>,
+    /// The last element up to which a thread is nearly straight from each element on, at the start and at the iterate.
+    straight: Vec<usize>,
 }
 
 /// Least clearances of an accepted state, in thread diameters.
@@ -32,41 +39,79 @@ pub(crate) struct Clearance {
     pub shape: Option<f64>,
 }
 
-impl Candidates {
-    /// Radius of the thread of an element.
-    #[inline]
-    fn radius(model: &Model, e: usize) -> f64 {
-        model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius)
-    }
+/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at least cos(1 / 2) = 0.87
+/// of the arc between them apart, 2.7 radii if they are no neighbors.
+const STRAIGHT: f64 = 1.0;
+/// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(3 / 4) pi > 2.2.
+const BENT: f64 = 1.5;
 
-    /// Whether two elements are so near along one thread that their overlap is bending, not contact: less than half a turn of the
-    /// thread's own radius.
-    fn neighbors(&self, model: &Model, a: usize, b: usize) -> bool {
-        model.rod_of[a] == model.rod_of[b] && self.arc[b] - self.arc[a + 1] < core::f64::consts::PI * Self::radius(model, a)
+/// Total turning of two centerlines up to each element; from rod to rod it jumps.
+fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
+    total.clear();
+    let one = f64x2::splat(1.0);
+    let (mut sum, mut before) = (f64x2::splat(0.0), None::<Vec2>);
+    for e in 0..model.mass.len() {
+        if !model.is_element(e) {
+            sum += f64x2::splat(10.0 * BENT);
+            before = None;
+        } else {
+            let d = Vec2::load(x[0][e + 1], x[1][e + 1]).less(&Vec2::load(x[0][e], x[1][e]));
+            let t = d.scaled(one / d.dot(&d).sqrt());
+            if let Some(b) = before {
+                // The angle of unit vectors whose difference is c: 2 asin(c / 2) <= c + c^3 / 7 as c <= 2.
+                let c = t.less(&b);
+                let c2 = c.dot(&c);
+                sum += c2.sqrt() * (one + c2 * f64x2::splat(1.0 / 7.0));
+            }
+            before = Some(t);
+        }
+        total.push(sum.to_array());
     }
+}
+
+/// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than half a turn of the
+/// thread's own radius.
+#[inline]
+fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> bool {
+    arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] && model.rod_of[a] == model.rod_of[b]
 }
 
 /// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
 /// room for what Newton will add.
 pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { candidates, start, .. } = scratch;
-    let Candidates { threads, shapes, arc, tree } = candidates;
+    let Scratch { candidates, start, radius, .. } = scratch;
+    let Candidates { threads, shapes, arc, tree, turned, straight } = candidates;
+    let n = model.mass.len();
     arc.clear();
-    for e in 0..model.mass.len() {
+    for e in 0..n {
         let fresh = e == 0 || !model.is_element(e - 1);
         let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
         arc.push(s);
     }
-    let reach = params::REACH;
-    tree.fill(model.mass.len(), |e| {
+    turning(model, [start, &state.position], turned);
+    straight.clear();
+    let mut last = 0;
+    for e in 0..n {
+        last = last.max(e);
+        while last + 1 < n && [0, 1].iter().all(|k| turned[last + 1][*k] - turned[e][*k] <= STRAIGHT) {
+            last += 1;
+        }
+        straight.push(last);
+    }
+    tree.fill(n, |e| {
         if !model.is_element(e) {
             return Bounds::EMPTY;
         }
-        let grow = Candidates::radius(model, e) * (1.0 + reach);
+        let grow = radius[e] * (1.0 + params::REACH);
         Bounds::of(&[start[e], start[e + 1], state.position[e], state.position[e + 1]], grow)
     });
     threads.clear();
-    tree.pairs(|a, b| threads.push((a as u32, b as u32)));
+    let skip = |leaves: Range<usize>| leaves.start >= n || straight[leaves.start] + 1 >= leaves.end.min(n);
+    tree.pairs(skip, |a, b| {
+        if !neighbors(model, arc, radius, a, b) {
+            threads.push((a as u32, b as u32));
+        }
+    });
     threads.sort_unstable();
     shapes.clear();
     for (slot, shape) in model.shapes.iter() {
@@ -79,9 +124,6 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
         });
     }
     shapes.sort_unstable();
-    let mut list = core::mem::take(&mut candidates.threads);
-    list.retain(|(a, b)| !candidates.neighbors(model, *a as usize, *b as usize));
-    candidates.threads = list;
 }
 
 /// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and still approach,
@@ -91,11 +133,11 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
         detect(model, state, scratch);
     }
     let mut clearance = Clearance::default();
-    let Scratch { candidates, start, start_shape_pose, .. } = scratch;
+    let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
     let x = &state.position;
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
-        let sum = Candidates::radius(model, a) + Candidates::radius(model, b);
+        let sum = radius[a] + radius[b];
         let moved = relative_motion(start, x, a, b);
         // Cheap bound from the middles before the exact distance.
         let reach = 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
@@ -120,7 +162,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
-        let r = Candidates::radius(model, e);
+        let r = radius[e];
         let side = |p: DVec3, pose| shape.collider.distance(pose, p, None);
         for (i, s) in [(e, 0.0), (e, 0.5), (e + 1, 1.0)] {
             let at = |x: &[DVec3]| if s == 0.5 { (x[e] + x[e + 1]) * 0.5 } else { x[i] };
@@ -149,16 +191,22 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
     Ok(clearance)
 }
 
-/// Whether the iterate left the boxes in which candidates were sought.
-fn outran(model: &Model, state: &State, scratch: &Scratch) -> bool {
-    (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
-        let b = scratch.candidates.tree.leaf(e);
-        let keep = Candidates::radius(model, e) * 1.1;
-        [state.position[e], state.position[e + 1]].iter().any(|p| {
-            let (lo, hi) = (b.lo + DVec3::splat(keep), b.hi - DVec3::splat(keep));
-            p.cmplt(lo).any() || p.cmpgt(hi).any()
-        })
-    })
+/// Whether the iterate left the boxes in which candidates were sought, or bent a piece that was taken as straight.
+fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
+    let Scratch { candidates, radius, .. } = scratch;
+    let x = &state.position;
+    let left = (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
+        let b = candidates.tree.leaf(e);
+        let keep = DVec3::splat(radius[e] * 1.1);
+        let (lo, hi) = (b.lo + keep, b.hi - keep);
+        x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
+    });
+    left || {
+        // Both lanes the same: there is one centerline to look at.
+        turning(model, [x, x], &mut candidates.turned);
+        let end = &candidates.turned;
+        candidates.straight.iter().enumerate().any(|(a, b)| end[*b][0] - end[a][0] > BENT)
+    }
 }
 
 /// Largest relative move of two points of the two elements.
@@ -186,4 +234,55 @@ fn passes(from: &[DVec3], to: &[DVec3], a: usize, b: usize, least: f64) -> bool 
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Material, RodSpec, World};
+
+    /// A straight thread of 100 elements of one radius each, at the start of a substep in which nothing moves.
+    fn straight_thread() -> (Model, State, Scratch, f64) {
+        let r = 1e-4;
+        let mut world = World::default();
+        world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (100.0 * r), 100, r, Material::elastic(1e9, 1000.0))).unwrap();
+        let (model, state) = world.into_parts();
+        let mut scratch = Scratch::default();
+        scratch.fit(&model);
+        scratch.start.copy_from_slice(&state.position);
+        (model, state, scratch, r)
+    }
+
+    #[test]
+    fn a_straight_thread_has_no_candidates_and_a_fold_of_it_is_found_after_all() {
+        let (model, mut state, mut scratch, r) = straight_thread();
+        detect(&model, &state, &mut scratch);
+        assert!(scratch.candidates.threads.is_empty());
+        assert!(sweep(&model, &state, &mut scratch).is_ok());
+        // The second half back along the first, one radius beside it.
+        for i in 51..=100 {
+            state.position[i] = state.position[100 - i] + DVec3::Y * r;
+        }
+        assert!(sweep(&model, &state, &mut scratch).is_err());
+    }
+
+    #[test]
+    fn only_pieces_that_bend_are_searched() {
+        let (model, mut state, mut scratch, r) = straight_thread();
+        // A hairpin of radius 2 r in the middle.
+        let turn = 7;
+        for i in 50..=100 {
+            let angle = (f64::from(i as u32 - 50) / f64::from(turn)).min(1.0) * core::f64::consts::PI;
+            state.position[i] = state.position[50] + DVec3::new(angle.sin(), 1.0 - angle.cos(), 0.0) * (2.0 * r);
+            if i > 50 + turn as usize {
+                state.position[i] -= DVec3::X * (r * (i - 50 - turn as usize) as f64);
+            }
+        }
+        scratch.start.copy_from_slice(&state.position);
+        detect(&model, &state, &mut scratch);
+        let pairs = &scratch.candidates.threads;
+        // The legs are 4 r apart, so each element of one is in reach of some of the other; no pair lies within one leg.
+        assert!(pairs.iter().all(|(a, b)| *b >= 50 && *a < 57), "{pairs:?}");
+        assert!((10..50).all(|a| pairs.iter().any(|(x, _)| *x == a)));
+    }
 }

@@ -1,6 +1,7 @@
 //! A binary tree of boxes over the elements in array order. Neighbors along a thread are neighbors in space, so the tree never needs
 //! sorting: it is refilled bottom up.
 
+use core::ops::Range;
 use glam::DVec3;
 
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +37,8 @@ pub(crate) struct Tree {
     nodes: Vec<Bounds>,
     leaves: usize,
     stack: Vec<(u32, u32)>,
+    /// Of pairs of nodes of one level, with the number of leaves under each.
+    pair_stack: Vec<(u32, u32, u32)>,
 }
 
 impl Tree {
@@ -56,27 +59,30 @@ impl Tree {
         &self.nodes[self.leaves - 1 + i]
     }
 
-    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves.
-    pub fn pairs(&mut self, mut found: impl FnMut(usize, usize)) {
-        let inner = self.leaves as u32 - 1;
-        self.stack.clear();
-        self.stack.push((0, 0));
-        while let Some((a, b)) = self.stack.pop() {
+    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves, except where `skip` says of a range of leaves that no pair within it
+    /// matters.
+    pub fn pairs(&mut self, skip: impl Fn(Range<usize>) -> bool, mut found: impl FnMut(usize, usize)) {
+        let leaves = self.leaves as u32;
+        self.pair_stack.clear();
+        self.pair_stack.push((0, 0, leaves));
+        while let Some((a, b, size)) = self.pair_stack.pop() {
+            // The level begins at node leaves / size - 1.
+            let first = |k: u32| ((k + 1) * size - leaves) as usize;
+            let half = size / 2;
             if a == b {
-                if a < inner {
-                    self.stack.extend([(2 * a + 1, 2 * a + 1), (2 * a + 2, 2 * a + 2), (2 * a + 1, 2 * a + 2)]);
+                if size > 1 && !skip(first(a)..first(a + 1)) {
+                    self.pair_stack.extend([(2 * a + 1, 2 * a + 1, half), (2 * a + 2, 2 * a + 2, half), (2 * a + 1, 2 * a + 2, half)]);
                 }
                 continue;
             }
-            if !self.nodes[a as usize].overlaps(&self.nodes[b as usize]) {
+            if !self.nodes[a as usize].overlaps(&self.nodes[b as usize]) || skip(first(a)..first(b + 1)) {
                 continue;
             }
-            // Two different nodes are always of the same level.
-            if a >= inner {
-                found((a - inner) as usize, (b - inner) as usize);
+            if size == 1 {
+                found(first(a), first(b));
             } else {
                 let (a, b) = (2 * a + 1, 2 * b + 1);
-                self.stack.extend([(a, b), (a, b + 1), (a + 1, b), (a + 1, b + 1)]);
+                self.pair_stack.extend([(a, b, half), (a, b + 1, half), (a + 1, b, half), (a + 1, b + 1, half)]);
             }
         }
     }
@@ -113,7 +119,7 @@ mod tests {
         let mut tree = Tree::default();
         tree.fill(boxes.len(), |i| boxes[i]);
         let mut got = Vec::new();
-        tree.pairs(|i, j| got.push((i, j)));
+        tree.pairs(|_| false, |i, j| got.push((i, j)));
         got.sort_unstable();
         let mut want = Vec::new();
         for i in 0..boxes.len() {
@@ -124,6 +130,13 @@ mod tests {
             }
         }
         assert_eq!(got, want);
+        // With pairs up to six apart left out where whole ranges are.
+        got.clear();
+        tree.pairs(|range| range.len() <= 7, |i, j| got.push((i, j)));
+        got.sort_unstable();
+        let far: Vec<_> = want.iter().copied().filter(|(i, j)| j - i > 6).collect();
+        assert_eq!(got, far);
+        assert!(far.len() < want.len());
         assert!(want.len() > 40 && want.len() < 600);
     }
 }

@@ -11,47 +11,78 @@
 //! Source: Kugelstadt and Schoemer 2016 (staggered frames); Deul et al. 2018 (physical compliance). The logarithm instead of 2 Im(q) and
 //! the symmetric rest are ours.
 
-use crate::math::{exp, log, outer};
-use glam::{DMat3, DQuat, DVec3};
+use crate::math::{log, log_and_root};
+use crate::rod::lanes::{Quat2, Vec2, lanes};
+use glam::{DQuat, DVec3};
+use wide::f64x2;
 
-/// Angle of a joint along the directors halfway, and its derivative.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Joint {
-    /// theta \[rad\].
-    pub angle: DVec3,
-    /// d theta / d (phi1 - phi0).
-    pub derivative: DMat3,
+/// Angles of two joints along the directors halfway, and what their derivatives d theta / d (phi1 - phi0) = M Rm^T are made of.
+pub(super) struct Joints {
+    /// theta \[rad\], and its square.
+    pub angle: Vec2,
+    pub squared: f64x2,
+    /// Columns of Rm.
+    pub middle: [Vec2; 3],
+    /// M = (1 + c theta^2) I - c theta theta^T.
+    pub c: f64x2,
 }
 
 /// Rotation angle of a joint from its rest value.
 #[inline]
 pub(crate) fn joint_angle(q0: DQuat, q1: DQuat, rest_half: DQuat) -> DVec3 {
-    let back = rest_half.conjugate();
-    log(back * (q0.conjugate() * q1) * back)
+    log((q0 * rest_half).conjugate() * (q1 * rest_half.conjugate()))
 }
 
-/// The same with its derivative.
-#[inline]
-pub(crate) fn joint(q0: DQuat, q1: DQuat, rest_half: DQuat) -> Joint {
-    let angle = joint_angle(q0, q1, rest_half);
-    let middle = q0 * rest_half * exp(angle * 0.5);
-    let rt = DMat3::from_quat(middle).transpose();
-    let t2 = angle.length_squared();
-    // (a / sin a - 1) / theta^2 with a = theta / 2: series below, exact above.
-    let c = if t2 < 0.04 {
-        1.0 / 24.0 + t2 * (7.0 / 5760.0 + t2 * (31.0 / 967_680.0 + t2 * (127.0 / 154_828_800.0)))
-    } else {
-        let a = 0.5 * t2.sqrt();
-        (a / libm::sin(a) - 1.0) / t2
-    };
+/// The same for two joints, with the derivatives.
+#[inline(always)]
+pub(super) fn joints(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> Joints {
+    let half = Quat2::load(rest_half[0], rest_half[1]);
+    let first = Quat2::load(q0[0], q0[1]).times(&half);
+    let turn = first.conjugate().times(&Quat2::load(q1[0], q1[1]).times(&half.conjugate()));
+    let one = f64x2::splat(1.0);
+    // tan^2 of a quarter of the angle, as in `math::log`.
+    let s2 = turn.v.dot(&turn.v);
+    let inverse = one / ((s2 + turn.w * turn.w).sqrt() + turn.w);
+    let u = s2 * inverse * inverse;
+    let [low, high] = u.to_array();
+    // Both angles under 0.2 rad.
+    if low < 0.0025 && high < 0.0025 {
+        let k = |x: f64| f64x2::splat(x);
+        // 4 atan(x) / x; the first term left out is u^7 / 15.
+        let series = one - u * (k(1.0 / 3.0) - u * (k(0.2) - u * (k(1.0 / 7.0) - u * (k(1.0 / 9.0) - u * (k(1.0 / 11.0) - u * k(1.0 / 13.0))))));
+        let angle = turn.v.scaled(k(4.0) * inverse * series);
+        let squared = angle.dot(&angle);
+        // (a / sin a - 1) / theta^2 with a = theta / 2.
+        let c = k(1.0 / 24.0) + squared * (k(7.0 / 5760.0) + squared * (k(31.0 / 967_680.0) + squared * k(127.0 / 154_828_800.0)));
+        // cos^2 (a / 2) = (1 + cos a) / 2.
+        let cosine = (k(0.5) + k(0.5) * turn.w).sqrt();
+        let root = Quat2 { v: turn.v.scaled(k(0.5) / cosine), w: cosine };
+        return Joints { angle, squared, middle: first.times(&root).axes(), c };
+    }
+    let (low, high) = turn.split();
+    let ((a0, c0, r0), (a1, c1, r1)) = (large(low), large(high));
+    let angle = Vec2::load(a0, a1);
+    Joints { angle, squared: angle.dot(&angle), middle: first.times(&Quat2::load(r0, r1)).axes(), c: lanes(c0, c1) }
+}
+
+/// Rotation vector of `turn`, c, and half the rotation, for any angle.
+fn large(turn: DQuat) -> (DVec3, f64, DQuat) {
+    let (angle, half_over_sine, root) = log_and_root(turn);
+    let squared = angle.length_squared();
     // Near half a turn sin a is still near 1, so M is bounded by pi / 2.
-    let m = DMat3::from_diagonal(DVec3::splat(1.0 + c * t2)) - outer(angle, angle) * c;
-    Joint { angle, derivative: m * rt }
+    let c = if squared < 0.04 {
+        1.0 / 24.0 + squared * (7.0 / 5760.0 + squared * (31.0 / 967_680.0 + squared * (127.0 / 154_828_800.0)))
+    } else {
+        (half_over_sine - 1.0) / squared
+    };
+    (angle, c, root)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{exp, outer};
+    use glam::DMat3;
 
     #[test]
     fn derivative_matches_differences() {
@@ -59,18 +90,24 @@ mod tests {
             let rest = exp(DVec3::new(0.1, 0.2, -0.15));
             let q0 = exp(DVec3::new(0.3, -0.7, 0.2));
             let q1 = q0 * rest * exp(DVec3::new(0.6, -0.48, 0.64) * size) * rest;
-            let j = joint(q0, q1, rest);
-            assert!((j.angle.length() - size).abs() < 1e-12);
+            // Two joints of different angles: the second is another one at rest.
+            let j = joints([q0, rest], [q1, rest * rest * rest], [rest; 2]);
+            let (angle, other) = j.angle.split();
+            assert!(other.length() < 1e-15);
+            let middle = DMat3::from_cols(j.middle[0].split().0, j.middle[1].split().0, j.middle[2].split().0);
+            let (c, squared) = (j.c.to_array()[0], j.squared.to_array()[0]);
+            assert!((angle.length() - size).abs() < 1e-12);
             for axis in 0..3 {
                 let e = 1e-6;
                 let mut d = DVec3::ZERO;
                 d[axis] = e;
                 let up = joint_angle(q0, exp(d) * q1, rest);
                 let down = joint_angle(exp(d) * q0, q1, rest);
-                let got = j.derivative.col(axis);
+                let m = DMat3::from_diagonal(DVec3::splat(1.0 + c * squared)) - outer(angle, angle) * c;
+                let got = (m * middle.transpose()).col(axis);
                 // Forward differences of step 1e-6.
-                assert!(((up - j.angle) / e - got).length() < 1e-5, "size {size} axis {axis}: {:?} {:?}", (up - j.angle) / e, got);
-                assert!(((down - j.angle) / e + got).length() < 1e-5);
+                assert!(((up - angle) / e - got).length() < 1e-5, "size {size} axis {axis}: {:?} {:?}", (up - angle) / e, got);
+                assert!(((down - angle) / e + got).length() < 1e-5);
             }
         }
     }

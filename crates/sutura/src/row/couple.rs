@@ -120,7 +120,9 @@ pub(crate) fn zones(scratch: &mut Scratch) {
             lo = lo.min(e);
             hi = hi.max(e + 1);
         }
-        *zone = if lo == usize::MAX { blocks.end - 1..blocks.end } else { lo..hi + 1 };
+        // Without rows the middle, so that elimination from both ends is balanced.
+        let middle = (blocks.start + blocks.end) / 2;
+        *zone = if lo == usize::MAX { middle..middle + 1 } else { lo..hi + 1 };
     }
 }
 

@@ -501,7 +501,8 @@ impl World {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let state = crate::snapshot::read(bytes)?;
         self.check_fit(&state).map_err(|reason| Error::Snapshot { reason: reason.into() })?;
-        self.state = state;
+        // Into the memory that is there, so that the next steps need not grow it again.
+        self.state.copy_from(&state);
         self.refresh_masses();
         Ok(())
     }

@@ -230,9 +230,10 @@ fn over_a_cylinder(way: &Way) -> Answers {
     vec![("light end", points[0], 0.02), ("heavy end", points[60], 0.015), ("contact force", carried, 12e-3)]
 }
 
-/// Largest difference of two sets of answers, relative to their sizes, and where.
+/// Largest difference of two sets of answers, relative to their sizes, and where. What is not a number is the largest.
 fn difference(a: &Answers, b: &Answers) -> (f64, &'static str) {
-    a.iter().zip(b).map(|((name, p, size), (_, q, _))| ((*p - *q).length() / size, *name)).fold((0.0, ""), |x, y| if y.0 > x.0 { y } else { x })
+    let parts = a.iter().zip(b).map(|((name, p, size), (_, q, _))| (((*p - *q).length() / size).abs(), *name));
+    parts.max_by(|x, y| x.0.total_cmp(&y.0)).expect("a case has answers")
 }
 
 /// Ways of solving and of damping, none of which has a part in rest.
@@ -244,9 +245,12 @@ fn numerics() -> Vec<(&'static str, Way)> {
         ("linear damping", Way { linear_damping: 0.9, ..PLAIN }),
         ("angular damping", Way { angular_damping: 0.9, ..PLAIN }),
         ("both", Way { linear_damping: 0.5, angular_damping: 0.99, ..PLAIN }),
-        ("no Kelvin-Voigt", Way { bend_damping: 0.0, ..PLAIN }),
-        ("five times Kelvin-Voigt", Way { bend_damping: 0.05, ..PLAIN }),
     ]
+}
+
+/// Kelvin-Voigt damping is of the material and not to be changed while a world runs.
+fn kelvin_voigt() -> Vec<(&'static str, Way)> {
+    vec![("no Kelvin-Voigt", Way { bend_damping: 0.0, ..PLAIN }), ("five times Kelvin-Voigt", Way { bend_damping: 0.05, ..PLAIN })]
 }
 
 /// The same thing otherwise placed, numbered or sized.
@@ -268,7 +272,7 @@ fn compare(case: impl Fn(&Way) -> Answers, ways: &[(&'static str, Way)], toleran
         .iter()
         .map(|(name, way)| (name, difference(&plain, &case(way))))
         .inspect(|(name, (d, what))| println!("{name}: {what} differs by {d:.1e}"))
-        .filter(|(_, (d, _))| !(*d < tolerance))
+        .filter(|(_, (d, _))| d.is_nan() || *d >= tolerance)
         .map(|(name, (d, what))| format!("{name}: {what} differs by {d:.1e}"))
         .collect();
     assert!(off.is_empty(), "beyond {tolerance:e}: {off:?}");
@@ -282,6 +286,7 @@ const SYMMETRY: f64 = 1e-5;
 #[test]
 fn tip_load_whatever_the_numerics() {
     compare(cantilever_under_tip_load, &numerics(), NUMERICS);
+    compare(cantilever_under_tip_load, &kelvin_voigt(), NUMERICS);
 }
 #[test]
 fn tip_load_whatever_the_view() {
@@ -290,6 +295,7 @@ fn tip_load_whatever_the_view() {
 #[test]
 fn self_weight_whatever_the_numerics() {
     compare(cantilever_under_self_weight, &numerics(), NUMERICS);
+    compare(cantilever_under_self_weight, &kelvin_voigt(), NUMERICS);
 }
 #[test]
 fn self_weight_whatever_the_view() {
@@ -298,6 +304,7 @@ fn self_weight_whatever_the_view() {
 #[test]
 fn catenary_whatever_the_numerics() {
     compare(catenary, &numerics(), NUMERICS);
+    compare(catenary, &kelvin_voigt(), NUMERICS);
 }
 #[test]
 fn catenary_whatever_the_view() {
@@ -306,6 +313,7 @@ fn catenary_whatever_the_view() {
 #[test]
 fn clamped_twist_whatever_the_numerics() {
     compare(clamped_twist, &numerics(), NUMERICS);
+    compare(clamped_twist, &kelvin_voigt(), NUMERICS);
 }
 #[test]
 fn clamped_twist_whatever_the_view() {
@@ -313,8 +321,7 @@ fn clamped_twist_whatever_the_view() {
 }
 #[test]
 fn over_a_cylinder_whatever_the_numerics() {
-    let ways: Vec<_> = numerics().into_iter().filter(|(_, way)| way.bend_damping == PLAIN.bend_damping).collect();
-    compare(over_a_cylinder, &ways, NUMERICS);
+    compare(over_a_cylinder, &numerics(), NUMERICS);
 }
 #[test]
 fn over_a_cylinder_whatever_the_view() {

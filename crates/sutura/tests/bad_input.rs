@@ -640,7 +640,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    #[ignore = "panics: places are finite (row/thread.rs, merge), when numbers are large; and a NaN is accepted (newton.rs, max_or_nan)"]
+    #[ignore = "large numbers: a panic (row/thread.rs, merge: places are finite), a NaN that is taken (newton.rs, max_or_nan), a hang (newton.rs: a step whose work is negative is shortened by nothing, for ever)"]
     fn a_snapshot_with_a_flipped_bit(at in any::<prop::sample::Index>(), bit in 0u32..8) {
         let mut world = full_world();
         let mut bytes = world.snapshot();
@@ -650,7 +650,7 @@ proptest! {
     }
 
     #[test]
-    #[ignore = "panics: places are finite (row/thread.rs, merge), when numbers are large; and a NaN is accepted (newton.rs, max_or_nan)"]
+    #[ignore = "large numbers: a panic (row/thread.rs, merge: places are finite), a NaN that is taken (newton.rs, max_or_nan), a hang (newton.rs: a step whose work is negative is shortened by nothing, for ever)"]
     fn a_snapshot_with_a_number_exchanged(at in any::<prop::sample::Index>(), new in prop_oneof![
         Just(f64::NAN.to_bits()), Just(f64::INFINITY.to_bits()), Just(f64::MAX.to_bits()), Just((-1e200f64).to_bits()), Just(0u64), Just(u64::MAX), any::<u64>(),
     ]) {
@@ -853,7 +853,7 @@ fn a_thread_inserted_in_a_shape() {
 }
 
 #[test]
-#[ignore = "pulled by 10 mm of 50 and let go, elements shrink by 73 % in a substep taken with a residual of 4730 radii, and every later step is stuck"]
+#[ignore = "pulled by 10 mm of 50 and let go, elements shrink by 73 % in a substep taken with a residual of 4730 radii, and every later step is stuck; with 8 halvings after 0.1 mm already"]
 fn an_inextensible_thread_pulled_beyond_its_length() {
     for hold in [Hold::Pin, Hold::Clamp, Hold::Jaw] {
         for by in [1e-4, 1e-2, 0.1] {

@@ -636,6 +636,24 @@ fn a_snapshot_of_another_world() {
     assert_usable(&mut other, 1, "other");
 }
 
+#[test]
+fn a_snapshot_with_nan_in_place_of_a_number() {
+    let mut world = full_world();
+    let bytes = world.snapshot();
+    // Eight bytes that make a number as they occur here are one, mostly; the others lie across two, and may make one that will do.
+    let number = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()).abs();
+    let numbers: Vec<usize> = (8..bytes.len() - 8).filter(|at| (1e-9..1e3).contains(&number(*at))).collect();
+    assert!(numbers.len() > 200, "{}", numbers.len());
+    let mut taken = 0;
+    for at in &numbers {
+        let mut damaged = bytes.clone();
+        damaged[*at..at + 8].copy_from_slice(&NAN.to_le_bytes());
+        taken += usize::from(restore_damaged(&mut world, &damaged).is_ok());
+        world.restore(&bytes).unwrap();
+    }
+    assert!(taken < numbers.len() / 5, "{taken} of {} were taken", numbers.len());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -52,7 +52,8 @@ impl<T> Default for Slots<T> {
 impl<T> Slots<T> {
     pub(crate) fn insert<K>(&mut self, value: T) -> Handle<K> {
         if let Some(i) = self.slots.iter().position(|(_, v)| v.is_none()) {
-            self.slots[i].0 += 1;
+            // A damaged snapshot may hold any generation.
+            self.slots[i].0 = self.slots[i].0.wrapping_add(1);
             self.slots[i].1 = Some(value);
             return Handle::new(i as u32, self.slots[i].0);
         }

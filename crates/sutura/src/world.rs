@@ -501,7 +501,8 @@ impl World {
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let state = crate::snapshot::read(bytes)?;
         self.check_fit(&state).map_err(|reason| Error::Snapshot { reason: reason.into() })?;
-        self.state = state;
+        // Into the memory that is there, so that the next steps need not grow it again.
+        self.state.copy_from(&state);
         self.refresh_masses();
         Ok(())
     }
@@ -530,7 +531,9 @@ impl World {
             let rod = self.model.rods.at(g.rod).ok_or("a grip holds a thread that is not here")?;
             let last = if g.hold == Hold::Jaw { rod.n_elements - 1 } else { rod.n_elements };
             let poses = g.pose.is_valid() && g.target.is_valid() && g.taken_pose.is_valid() && g.rest_half.is_normalized();
-            if g.index > last || g.drive.validate().is_err() || !poses || !g.half_span.is_finite() {
+            let vectors = [g.half_span, g.taken_velocity, g.taken_spin, g.force, g.torque].iter().all(|v| v.is_finite());
+            let times = g.ramp.is_finite() && g.ramp >= 0.0 && g.taken_at.is_finite();
+            if g.index > last || g.drive.validate().is_err() || !poses || !vectors || !times {
                 return Err("a grip is out of range");
             }
         }
@@ -540,13 +543,23 @@ impl World {
                 return Err("a load is out of range");
             }
         }
+        // Finite numbers may be so large that the strains are not.
         let element = |e: u32| (e as usize) < n && self.model.is_element(e as usize);
-        let threads = s
-            .thread_contacts
+        for e in (0..n).filter(|e| element(*e as u32)) {
+            if !(crate::rod::element_strain(&self.model, s, e) * self.model.stretch_stiffness[e]).is_finite() {
+                return Err("the length of an element in it is out of all proportion");
+            }
+        }
+        let place = |s: f64| (0.0..=1.0).contains(&s);
+        let forces =
+            |normal: DVec3, normal_force: f64, friction: DVec3| (normal.length() - 1.0).abs() < 1e-6 && normal_force.is_finite() && friction.is_finite();
+        let threads = s.thread_contacts.iter().all(|c| {
+            element(c.a) && element(c.b) && c.a < c.b && place(c.s) && place(c.t) && forces(c.normal, c.normal_force, c.friction) && c.drift.is_finite()
+        });
+        let shapes = s
+            .shape_contacts
             .iter()
-            .all(|c| element(c.a) && element(c.b) && c.a < c.b && c.normal.is_finite() && c.friction.is_finite() && c.normal_force.is_finite());
-        let shapes =
-            s.shape_contacts.iter().all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && c.normal.is_finite() && c.friction.is_finite());
+            .all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && place(c.s) && forces(c.normal, c.normal_force, c.friction));
         if !(threads && shapes) {
             return Err("a contact is out of range");
         }

@@ -97,7 +97,8 @@ impl Collider {
     /// World box that holds the shape.
     pub fn bounds(&self, pose: &Pose) -> (DVec3, DVec3) {
         let shape: &dyn Shape = match self {
-            Collider::Plane => return (DVec3::NEG_INFINITY, DVec3::INFINITY),
+            // Finite: an infinite box would meet the empty one of an unused leaf of the tree.
+            Collider::Plane => return (DVec3::splat(f64::MIN), DVec3::splat(f64::MAX)),
             Collider::Solid(shape) => shape.as_ref(),
             Collider::Surface(mesh) => mesh.as_ref(),
         };

@@ -152,7 +152,7 @@ impl RodSpec {
         let shortest = 1e-3 * self.radius;
         for i in 0..n {
             let l = (points[i + 1] - points[i]).length();
-            if l <= shortest {
+            if !(l.is_finite() && l > shortest) {
                 return Err(Error::invalid(what, format!("centerline[{i}..{}]", i + 1), l, "neighboring points farther apart than radius / 1000"));
             }
         }

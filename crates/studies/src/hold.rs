@@ -1,12 +1,13 @@
 //! Which knots hold: a knot tied loosely around a post in two halves is drawn to a force by its tails and let go; then the halves of the
 //! post load its loop.
 
-use crate::case::Budget;
+use crate::case::{Budget, assignments};
 use crate::curve::{Stack, knot_free};
 use crate::map;
 use crate::run::{ENDED, NOT_FINISHED, Study};
 use crate::session::{Session, quantile};
 use crate::table::{Table, markdown};
+use anyhow::Context as _;
 use std::path::Path;
 use sutura::glam::DVec3;
 use sutura::knot::{Entries, entries};
@@ -34,8 +35,6 @@ const SET: Plasticity = Plasticity { yield_curvature: 500.0, yield_twist: 500.0,
 const BEND_DAMPING: f64 = 0.01;
 /// Friction of thread on the post, as the scene.
 const MU_POST: f64 = 0.15;
-/// Element length in diameters, as the scene.
-const ELEMENT: f64 = 2.0;
 /// Radius of the halves of the post, and length of a tail before the draw \[m\].
 const POST: f64 = 2e-3;
 const TAIL: f64 = 8e-3;
@@ -43,12 +42,15 @@ const POST_HALF_LENGTH: f64 = 0.02;
 /// Speeds at which a tail is drawn and half a post pushed when nothing resists \[m/s\].
 const DRAW_SPEED: f64 = 0.03;
 const PUSH_SPEED: f64 = 0.005;
+/// Force that keeps the loop taut while the tails are drawn, over the force on them.
+const COUNTER: f64 = 0.1;
 /// Load on the loop \[N\].
 const LOAD: f64 = 1.0;
 /// A tail counts as drawn at this part of the force: it rests only in the limit. The scene has the same.
 const DRAWN: f64 = 0.975;
 /// The longest that a draw may take, and how long the phases after it are \[s\].
 const DRAW_LONGEST: f64 = 3.0;
+const DRAW_SETTLE: f64 = 0.2;
 const LET_GO: f64 = 0.3;
 const RAMP: f64 = 1.0;
 const SETTLE: f64 = 1.0;
@@ -56,19 +58,33 @@ const HOLD: f64 = 3.0;
 const FRAME: f64 = 1.0 / 60.0;
 /// Slip in the hold under which a knot holds \[m\].
 const HOLDS: f64 = 1e-4;
-/// Slip since it was let go beyond which a knot has failed \[m\] (Silver, J Oral Maxillofac Surg).
+/// Load from which on the loop counts as taut \[N\].
+const TAUT: f64 = 0.05;
+/// Growth of the taut loop beyond which a knot has failed \[m\] (Silver, J Oral Maxillofac Surg: slip of more than 1.8 mm).
 const FAILED: f64 = 1.8e-3;
+/// Growth of a loop that never was taut at which it has failed too: more than it was slack.
+const FAILED_SLACK: f64 = 8e-3;
 /// Surfaces.
 const THREAD_SURFACE: u32 = 0;
 const POST_SURFACE: u32 = 1;
 
-/// A case: indices into the lists above.
+/// A case: indices into the lists above, and numbers. What is not a factor of the study has a default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
     thread: usize,
     knot: usize,
     mu: f64,
     draw: f64,
+    /// Element length in diameters. With 2, as in the scene, the solver does not come to rest under the load.
+    element: f64,
+    /// Longest substep \[s\].
+    substep: f64,
+}
+
+impl Default for Case {
+    fn default() -> Self {
+        Case { thread: 1, knot: 0, mu: 0.3, draw: 1.0, element: 1.0, substep: 1.0 / 240.0 }
+    }
 }
 
 /// The world of a case.
@@ -80,6 +96,25 @@ struct Tied {
 }
 
 impl Case {
+    /// A case from `key=value` pairs; `l` is the element length in diameters, `substep` the number of substeps a second.
+    pub fn parse(text: &str) -> anyhow::Result<Case> {
+        let mut case = Case::default();
+        for (key, value) in assignments(text)? {
+            let number = || value.parse::<f64>().with_context(|| format!("{key}: `{value}` is no number"));
+            let no_such = || format!("there is no {key} `{value}`");
+            match key.as_str() {
+                "thread" => case.thread = THREADS.iter().position(|t| t.0 == value).with_context(no_such)?,
+                "knot" => case.knot = KNOTS.iter().position(|k| k.0 == value).with_context(no_such)?,
+                "mu" => case.mu = number()?,
+                "draw" => case.draw = number()?,
+                "l" => case.element = number()?,
+                "substep" => case.substep = 1.0 / number()?,
+                _ => anyhow::bail!("there is no `{key}`; there are thread, knot, draw, mu, l, substep"),
+            }
+        }
+        Ok(case)
+    }
+
     fn tied(&self) -> Result<Tied, String> {
         let text = |e: sutura::Error| e.to_string();
         let (_, material, set) = THREADS[self.thread];
@@ -93,17 +128,15 @@ impl Case {
             bend_damping: BEND_DAMPING,
             plasticity: set.then_some(SET),
         };
-        let settings = Settings { gravity: DVec3::ZERO, linear_damping: 0.9, angular_damping: 0.9, ..Settings::default() };
+        let settings = Settings { gravity: DVec3::ZERO, substep: self.substep, linear_damping: 0.9, angular_damping: 0.9, ..Settings::default() };
         let mut world = World::new(settings).map_err(text)?;
         world.set_friction(THREAD_SURFACE, THREAD_SURFACE, Friction::coulomb(self.mu)).map_err(text)?;
         world.set_friction(THREAD_SURFACE, POST_SURFACE, Friction::coulomb(MU_POST)).map_err(text)?;
         let stack = Stack { diameter, post: POST, throws: KNOTS[self.knot].1.to_vec(), tail: TAIL };
-        let spec = RodSpec { surface: THREAD_SURFACE, ..RodSpec::new(stack.centerline(ELEMENT * diameter), 0.5 * diameter, material) };
+        let spec = RodSpec { surface: THREAD_SURFACE, ..RodSpec::new(stack.centerline(self.element * diameter), 0.5 * diameter, material) };
         let rod = world.insert_rod(&spec).map_err(text)?;
-        let post = ShapeSpec {
-            surface: POST_SURFACE,
-            ..ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: POST_HALF_LENGTH }, Pose::at(DVec3::ZERO))
-        };
+        let post =
+            ShapeSpec { surface: POST_SURFACE, ..ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: POST_HALF_LENGTH }, Pose::at(DVec3::ZERO)) };
         let posts = [world.insert_shape(&post).map_err(text)?, world.insert_shape(&post).map_err(text)?];
         Ok(Tied { world, rod, posts })
     }
@@ -121,8 +154,9 @@ struct Found {
     /// Force on the loop after the tails were let go, and the largest after that \[N\].
     residual: f64,
     peak: f64,
-    /// Largest slip since it was let go, and in the hold \[m\].
-    slip: f64,
+    /// Growth of the loop since it was taut, the end of the hold against its beginning, and the slip of the entries in the hold \[m\].
+    growth: f64,
+    growth_hold: Option<f64>,
     slip_hold: Option<f64>,
 }
 
@@ -132,6 +166,9 @@ struct Bench<'a> {
     rod: Handle<Rod>,
     posts: [Handle<Shape>; 2],
     found: Found,
+    /// What `opened` was when the loop was let go, and when it was first taut under the load.
+    let_go: f64,
+    taut: Option<f64>,
     trace: &'a mut dyn FnMut(String),
 }
 
@@ -151,6 +188,12 @@ impl Bench<'_> {
         along(0, 1.0).min(along(1, -1.0))
     }
 
+    /// Length of thread in the loop, less a constant: twice the distance of the halves \[m\].
+    fn opened(&self) -> f64 {
+        let x = |k: usize| self.s.world.shape(self.posts[k]).map_or(0.0, |s| s.pose.position.x);
+        2.0 * (x(1) - x(0))
+    }
+
     fn push(&mut self, force: f64) -> Result<(), String> {
         for (post, x) in self.posts.into_iter().zip([-1.0, 1.0]) {
             let motion = ShapeMotion::Pushed { direction: DVec3::X * x, force, speed_limit: PUSH_SPEED };
@@ -162,10 +205,10 @@ impl Bench<'_> {
     fn say(&mut self, what: &str) {
         let s = &self.s;
         let line = format!(
-            "{:.3} s: {what}, load {:.3} N, slip {:.4} mm, {} contacts, {} substeps, {} rejected, {:.0} ms a frame so far",
+            "{:.3} s: {what}, load {:.3} N, loop {:.3} mm longer, {} contacts, {} substeps, {} rejected, {:.0} ms a frame so far",
             s.world.time(),
             self.load(),
-            1e3 * self.found.slip,
+            1e3 * self.opened(),
             s.world.contacts().count(),
             s.substeps,
             s.rejected,
@@ -193,31 +236,45 @@ impl Bench<'_> {
             let drive = Drive::Force { direction, force, speed_limit: DRAW_SPEED };
             grips.push(self.s.world.insert_grip(&GripSpec { drive, ..GripSpec::at_once(self.rod, place, Held::Pin) }).map_err(text)?);
         }
+        self.push(COUNTER * force)?;
+        let pull = |s: &Session, k: usize| s.world.grip_wrench(grips[k]).map(|w| w.force.dot(outward[k])).map_err(text);
         while self.found.drawn < DRAWN * force {
             if self.s.world.time() > DRAW_LONGEST {
                 return Err(format!("the tails were not drawn to the force in {DRAW_LONGEST} s"));
             }
             self.frame("drawing")?;
-            let pull = |k: usize| self.s.world.grip_wrench(grips[k]).map(|w| w.force.dot(outward[k])).map_err(text);
-            self.found.drawn = pull(0)?.min(pull(1)?);
+            self.found.drawn = pull(&self.s, 0)?.min(pull(&self.s, 1)?);
+        }
+        for _ in 0..(DRAW_SETTLE / FRAME).round() as u32 {
+            self.frame("drawn")?;
         }
         self.found.knots[1] = self.knot()?;
         for grip in grips {
             self.s.world.remove_grip(grip).map_err(text)?;
         }
+        for post in self.posts {
+            self.s.world.set_shape_motion(post, ShapeMotion::Fixed).map_err(text)?;
+        }
         Ok(())
     }
 
     /// Frames for this time. What made the knot fail, if it did.
-    fn loaded(&mut self, what: &str, duration: f64, force: impl Fn(f64) -> f64, before: &Entries) -> Result<Option<String>, String> {
+    fn loaded(&mut self, what: &str, duration: f64, force: &dyn Fn(f64) -> f64) -> Result<Option<String>, String> {
         let frames = (duration / FRAME).round() as u32;
         for k in 1..=frames {
             self.push(force(f64::from(k) / f64::from(frames)))?;
             self.frame(what)?;
-            self.found.peak = self.found.peak.max(self.load());
-            let Some(now) = self.entries() else { return Ok(Some(format!("opens at {:.2} N", self.found.peak))) };
-            self.found.slip = self.found.slip.max(now.slip_since(before));
-            if self.found.slip > FAILED {
+            let load = self.load();
+            self.found.peak = self.found.peak.max(load);
+            let opened = self.opened();
+            if load >= TAUT {
+                self.taut.get_or_insert(opened);
+            }
+            self.found.growth = opened - self.taut.unwrap_or(self.let_go);
+            if self.entries().is_none() {
+                return Ok(Some(format!("opens at {:.2} N", self.found.peak)));
+            }
+            if self.found.growth > if self.taut.is_some() { FAILED } else { FAILED_SLACK } {
                 return Ok(Some(format!("slips at {:.2} N", self.found.peak)));
             }
         }
@@ -233,25 +290,25 @@ impl Bench<'_> {
             self.frame("let go")?;
         }
         self.found.knots[2] = self.knot()?;
-        let Some(before) = self.entries().filter(|_| self.found.knots[2] == self.found.knots[0]) else { return Ok("opens when let go".into()) };
+        if self.entries().is_none() || self.found.knots[2] != self.found.knots[0] {
+            return Ok("opens when let go".into());
+        }
+        self.let_go = self.opened();
         // The loop presses the halves together already; from that force to the load.
-        let residual = self.load().max(0.0);
-        (self.found.residual, self.found.peak) = (residual, 0.0);
-        let ramp = move |part: f64| residual.min(LOAD) + (LOAD - residual.min(LOAD)) * part;
-        for (what, duration, force) in [("loading", RAMP, &ramp as &dyn Fn(f64) -> f64), ("settling", SETTLE, &|_| LOAD)] {
-            if let Some(failed) = self.loaded(what, duration, force, &before)? {
+        self.found.residual = self.load();
+        let from = self.found.residual.clamp(0.0, LOAD);
+        for (what, duration, force) in [("loading", RAMP, &(|part| from + (LOAD - from) * part) as &dyn Fn(f64) -> f64), ("settling", SETTLE, &|_| LOAD)] {
+            if let Some(failed) = self.loaded(what, duration, force)? {
                 return Ok(failed);
             }
         }
-        let Some(marked) = self.entries() else { return Ok("opens at 1 N".into()) };
-        let failed = self.loaded("holding", HOLD, |_| LOAD, &before)?;
-        let slip = self.entries().map(|now| now.slip_since(&marked));
-        self.found.slip_hold = slip;
-        Ok(match (failed, slip) {
-            (Some(failed), _) => failed,
-            (None, Some(slip)) if slip < HOLDS => "holds".into(),
-            (None, _) => format!("slips at {:.2} N", self.found.peak),
-        })
+        let (marked, opened) = (self.entries(), self.opened());
+        if let Some(failed) = self.loaded("holding", HOLD, &|_| LOAD)? {
+            return Ok(failed);
+        }
+        let slip = marked.and_then(|marked| Some(self.entries()?.slip_since(&marked)));
+        (self.found.slip_hold, self.found.growth_hold) = (slip, Some(self.opened() - opened));
+        Ok(if slip.is_some_and(|slip| slip < HOLDS) { "holds".into() } else { format!("slips at {:.2} N", self.found.peak) })
     }
 }
 
@@ -264,14 +321,14 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
             return row;
         }
     };
-    let mut bench = Bench { s: Session::new(world, budget), rod, posts, found: Found::default(), trace };
+    let mut bench = Bench { s: Session::new(world, budget), rod, posts, found: Found::default(), let_go: 0.0, taut: None, trace };
     let ended = bench.run(case);
     bench.found.ended = ended.unwrap_or_else(|why| {
         let f = &bench.found;
         let phase = match () {
             () if f.knots[1].is_empty() => format!("drawing, {:.2} N", f.drawn),
             () if f.knots[2].is_empty() => "let go".into(),
-            () => format!("loading, {:.2} N, slip {:.3} mm", f.peak, 1e3 * f.slip),
+            () => format!("loading, {:.2} N, loop {:.3} mm longer", f.peak, 1e3 * f.growth),
         };
         format!("{NOT_FINISHED}{why}, at {:.3} s, {phase}", bench.s.world.time())
     });
@@ -284,7 +341,8 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
         found.ended,
         format!("{:.3}", found.peak),
         found.slip_hold.map(|v| format!("{:.5}", 1e3 * v)).unwrap_or_default(),
-        format!("{:.4}", 1e3 * found.slip),
+        found.growth_hold.map(|v| format!("{:.5}", 1e3 * v)).unwrap_or_default(),
+        format!("{:.4}", 1e3 * found.growth),
         format!("{:.3}", found.residual),
         format!("{:.3}", found.drawn),
         before,
@@ -316,7 +374,8 @@ impl Study for Hold {
         ENDED,
         "peak_n",
         "slip_hold_mm",
-        "slip_mm",
+        "growth_hold_mm",
+        "growth_mm",
         "residual_n",
         "drawn_n",
         "knot_before",
@@ -342,7 +401,7 @@ impl Study for Hold {
         for thread in 0..THREADS.len() {
             for knot in 0..KNOTS.len() {
                 for draw in DRAW {
-                    all.extend(MU.map(|mu| Case { thread, knot, mu, draw }));
+                    all.extend(MU.map(|mu| Case { thread, knot, mu, draw, ..Case::default() }));
                 }
             }
         }
@@ -390,9 +449,14 @@ fn grids(table: &Table) -> Vec<map::Grid> {
     let mut all = Vec::new();
     for (thread, (thread_name, ..)) in THREADS.iter().enumerate() {
         for (knot, (knot_name, _)) in KNOTS.iter().enumerate() {
-            let cells = DRAW.map(|draw| MU.map(|mu| cell(&Case { thread, knot, mu, draw })).to_vec()).to_vec();
+            let cells = DRAW.map(|draw| MU.map(|mu| cell(&Case { thread, knot, mu, draw, ..Case::default() })).to_vec()).to_vec();
             let title = format!("{thread_name}, {knot_name}");
-            all.push(map::Grid { title, x: ("mu".into(), MU.map(|m| m.to_string()).to_vec()), y: ("draw [N]".into(), DRAW.map(|d| d.to_string()).to_vec()), cells });
+            all.push(map::Grid {
+                title,
+                x: ("mu".into(), MU.map(|m| m.to_string()).to_vec()),
+                y: ("draw [N]".into(), DRAW.map(|d| d.to_string()).to_vec()),
+                cells,
+            });
         }
     }
     all
@@ -410,7 +474,7 @@ mod tests {
         all.dedup();
         assert_eq!(all.len(), Hold::cases().len());
         for (knot, want) in ["square", "granny-right", "surgeon-square-right", "square-and-throw-right"].into_iter().enumerate() {
-            let tied = Case { thread: 0, knot, mu: 0.3, draw: 1.0 }.tied().unwrap();
+            let tied = Case { knot, ..Case::default() }.tied().unwrap();
             let rod = tied.world.rod(tied.rod).unwrap();
             assert_eq!(knot_free(rod.positions()).name(), want);
         }
@@ -418,9 +482,9 @@ mod tests {
 
     #[test]
     fn a_case_over_budget_says_where_it_stood() {
-        let row = measure(&Case { thread: 0, knot: 0, mu: 0.3, draw: 1.0 }, Budget { cpu_s: 1e3, frames: 2 }, &mut |_| {});
+        let row = measure(&Case::default(), Budget { cpu_s: 1e3, frames: 2 }, &mut |_| {});
         assert_eq!(row.len(), Hold::MEASURES.len());
         assert!(row[0].starts_with("not finished: over 2 frames, at 0.033 s, drawing"), "{}", row[0]);
-        assert_eq!(row[6], "square");
+        assert_eq!(row[7], "square");
     }
 }

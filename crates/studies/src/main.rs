@@ -4,7 +4,7 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use sutura_studies::case::{Budget, Filter, seconds};
-use sutura_studies::hold::Hold;
+use sutura_studies::hold::{self, Hold};
 use sutura_studies::overhand::{self, Overhand};
 use sutura_studies::run::{Plan, Study, run};
 
@@ -30,6 +30,9 @@ enum Which {
     Hold {
         #[command(flatten)]
         common: Common,
+        /// Run one case, of the study or not, say how it goes and write nothing: `thread=silk,knot=granny,draw=1,mu=0.3,l=1,substep=480`
+        #[arg(long = "try", value_name = "KEY=VALUE,...", conflicts_with_all = ["only", "again", "jobs"])]
+        one: Option<String>,
     },
 }
 
@@ -85,7 +88,10 @@ fn main() -> ExitCode {
         Which::Overhand { common, one: Some(case) } => overhand::Case::parse(&case).map(|case| {
             Overhand::run(&case, common.budget(), &mut |line| eprintln!("{line}"));
         }),
-        Which::Hold { common } => common.run::<Hold>(),
+        Which::Hold { common, one: None } => common.run::<Hold>(),
+        Which::Hold { common, one: Some(case) } => hold::Case::parse(&case).map(|case| {
+            Hold::run(&case, common.budget(), &mut |line| eprintln!("{line}"));
+        }),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

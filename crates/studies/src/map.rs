@@ -97,7 +97,8 @@ pub fn draw(grids: &[Grid], stem: &Path) -> anyhow::Result<()> {
         for (k, grid) in grids.iter().enumerate() {
             panel_of(&area, grid, (LEFT + panel.0 * (k % ACROSS) as i32, TOP + panel.1 * (k / ACROSS) as i32))?;
         }
-        let kinds = [(Cell::Holds, "holds"), (Cell::Slips(0.0), "slips, after this load [N]"), (Cell::Opens(0.0), "opens"), (Cell::NotFinished, "not finished")];
+        let kinds =
+            [(Cell::Holds, "holds"), (Cell::Slips(0.0), "slips, after this load [N]"), (Cell::Opens(0.0), "opens"), (Cell::NotFinished, "not finished")];
         for (k, (cell, name)) in kinds.into_iter().enumerate() {
             let (x, y) = (LEFT + 220 * k as i32, size.1 - LEGEND / 2);
             area.draw(&Rectangle::new([(x, y - 7), (x + 18, y + 7)], cell.color().filled()))?;

@@ -43,7 +43,7 @@ const POST_HALF_LENGTH: f64 = 0.02;
 const DRAW_SPEED: f64 = 0.03;
 const PUSH_SPEED: f64 = 0.005;
 /// Force that keeps the loop taut while the tails are drawn, over the force on them.
-const COUNTER: f64 = 0.1;
+const COUNTER: f64 = 0.25;
 /// Load on the loop \[N\].
 const LOAD: f64 = 1.0;
 /// A tail counts as drawn at this part of the force: it rests only in the limit. The scene has the same.
@@ -60,8 +60,9 @@ const FRAME: f64 = 1.0 / 60.0;
 const HOLDS: f64 = 1e-4;
 /// Load from which on the loop counts as taut \[N\].
 const TAUT: f64 = 0.05;
-/// Growth of the taut loop beyond which a knot has failed \[m\] (Silver, J Oral Maxillofac Surg: slip of more than 1.8 mm).
-const FAILED: f64 = 1.8e-3;
+/// Growth of the taut loop beyond which a knot has failed \[m\]. A knot drawn in one go still tightens under the first load, by up to
+/// 1.8 mm in the cases seen; it holds less than 6 mm of thread.
+const FAILED: f64 = 5e-3;
 /// Growth of a loop that never was taut at which it has failed too: more than it was slack.
 const FAILED_SLACK: f64 = 8e-3;
 /// Surfaces.
@@ -426,6 +427,10 @@ impl Study for Hold {
             let rows = DRAW.iter().zip(&grid.cells).map(|(draw, cells)| std::iter::once(draw.to_string()).chain(cells.iter().map(map::Cell::words)).collect());
             out.push_str(&markdown(&head, rows));
         }
+        let mm = |row: &[String], name: &str| table.number(row, name).map(|v| 1e-3 * v.abs());
+        let apart = |r: &&Vec<String>| mm(r, "slip_hold_mm").zip(mm(r, "growth_hold_mm")).is_some_and(|(slip, growth)| (slip < HOLDS) != (growth < HOLDS));
+        let n_apart = table.rows.iter().filter(apart).count();
+        out.push_str(&format!("\nIn {n_apart} cases the slip of the entries in the hold and the growth of the loop are not on the same side of 0.1 mm.\n"));
         out.push_str("\n## Every case\n\n");
         let all: Vec<&str> = Self::FACTORS.iter().chain(Self::MEASURES).copied().filter(|c| !["first_incident", "state_hash"].contains(c)).collect();
         out.push_str(&table.markdown(&all));

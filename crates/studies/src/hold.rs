@@ -42,14 +42,16 @@ const POST_HALF_LENGTH: f64 = 0.02;
 /// Speeds at which a tail is drawn and half a post pushed when nothing resists \[m/s\].
 const DRAW_SPEED: f64 = 0.03;
 const PUSH_SPEED: f64 = 0.005;
-/// Force that keeps the loop taut while the tails are drawn, over the force on them.
-const COUNTER: f64 = 0.25;
+/// Force on the halves of the post that keeps the loop taut while the tails are drawn, and to which it rises when they are, so that the
+/// first throws get tight too; over the force on the tails.
+const COUNTER: (f64, f64) = (0.25, 1.0);
 /// Load on the loop \[N\].
 const LOAD: f64 = 1.0;
 /// A tail counts as drawn at this part of the force: it rests only in the limit. The scene has the same.
 const DRAWN: f64 = 0.975;
 /// The longest that a draw may take, and how long the phases after it are \[s\].
 const DRAW_LONGEST: f64 = 3.0;
+const TIGHTEN: f64 = 0.3;
 const DRAW_SETTLE: f64 = 0.2;
 const LET_GO: f64 = 0.3;
 const RAMP: f64 = 1.0;
@@ -237,7 +239,7 @@ impl Bench<'_> {
             let drive = Drive::Force { direction, force, speed_limit: DRAW_SPEED };
             grips.push(self.s.world.insert_grip(&GripSpec { drive, ..GripSpec::at_once(self.rod, place, Held::Pin) }).map_err(text)?);
         }
-        self.push(COUNTER * force)?;
+        self.push(COUNTER.0 * force)?;
         let pull = |s: &Session, k: usize| s.world.grip_wrench(grips[k]).map(|w| w.force.dot(outward[k])).map_err(text);
         while self.found.drawn < DRAWN * force {
             if self.s.world.time() > DRAW_LONGEST {
@@ -246,8 +248,10 @@ impl Bench<'_> {
             self.frame("drawing")?;
             self.found.drawn = pull(&self.s, 0)?.min(pull(&self.s, 1)?);
         }
-        for _ in 0..(DRAW_SETTLE / FRAME).round() as u32 {
-            self.frame("drawn")?;
+        for k in 1..=((TIGHTEN + DRAW_SETTLE) / FRAME).round() as u32 {
+            let part = (f64::from(k) * FRAME / TIGHTEN).min(1.0);
+            self.push((COUNTER.0 + (COUNTER.1 - COUNTER.0) * part) * force)?;
+            self.frame("tightening")?;
         }
         self.found.knots[1] = self.knot()?;
         for grip in grips {

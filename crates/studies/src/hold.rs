@@ -223,7 +223,7 @@ impl Bench<'_> {
     /// One frame; now and then says how it goes.
     fn frame(&mut self, what: &str) -> Result<(), String> {
         self.s.frame(FRAME)?;
-        if self.s.ms.len() % 20 == 0 {
+        if self.s.ms.len().is_multiple_of(20) {
             self.say(what);
         }
         Ok(())

@@ -161,7 +161,7 @@ fn draw_and_let_go(case: &Case, s: &mut Session, rod: sutura::Handle<sutura::Rod
     loop {
         let drawn = Drawn::of(s, rod).map_err(text)?;
         let time = s.world.time();
-        if s.ms.len() % 10 == 0 {
+        if s.ms.len().is_multiple_of(10) {
             trace(format!(
                 "{time:.4} s: T {:.4} % of EA, {:.1} d left, {} contacts, {} substeps, {} rejected, {} Newton, last frame {:.2} ms",
                 100.0 * drawn.tension / drawn.ea,

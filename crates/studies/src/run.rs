@@ -164,7 +164,7 @@ mod tests {
             vec![case.to_string()]
         }
         fn run(case: &u32, budget: Budget, _: &mut dyn FnMut(String)) -> Vec<String> {
-            vec![if case % 2 == 0 || budget.frames >= 10 { "well".into() } else { format!("{NOT_FINISHED}tired") }]
+            vec![if case.is_multiple_of(2) || budget.frames >= 10 { "well".into() } else { format!("{NOT_FINISHED}tired") }]
         }
         fn report(table: &Table, _: &Path) -> anyhow::Result<String> {
             Ok(format!("# Numbers\n\n{}", table.markdown(&["n", ENDED])))

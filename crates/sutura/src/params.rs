@@ -89,11 +89,9 @@ pub(crate) const PARALLEL: f64 = 0.914;
 /// Part of an old overlap that may remain after a substep.
 pub(crate) const RECOVER: f64 = 0.8;
 /// Residual of the contact solve, in radii.
-pub(crate) const CONTACT_TOLERANCE: f64 = 2e-3;
+pub(crate) const CONTACT_TOLERANCE: f64 = 1e-3;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
 pub(crate) const CONTACT_LEFT: f64 = 0.02;
-/// Weight of the contact solve's proximal term.
-pub(crate) const PROXIMAL: f64 = 0.1;
 
 impl Settings {
     pub(crate) fn validate(&self) -> Result<(), Error> {

@@ -1,50 +1,69 @@
 //! The small contact problem: minimize `l^T S l / 2 + b^T l` over normal forces >= 0 and friction forces within a disc.
 //!
-//! S is the compliance between contacts, symmetric positive definite (the contacts' own compliance is on its diagonal). With the radius
-//! of each disc held fixed the problem is convex; the radii follow mu times the normal forces in an outer loop, with a proximal term
-//! that keeps redundant contacts (parallel strands) from swapping load. Taking the disc as part of a cone instead would lift a sliding
-//! contact (associated friction), which Coulomb's law does not.
+//! S is the compliance between contacts, symmetric positive definite (the contacts' own compliance is on its diagonal) and ill conditioned:
+//! of forty near contacts in a knot some eight carry, and the others are nearly dependent on them. With the radius of each disc held
+//! fixed the problem is convex; the radii follow mu times the normal forces in an outer loop. Taking the disc as part of a cone instead would
+//! lift a sliding contact (associated friction), which Coulomb's law does not.
 //!
-//! Inner loop: two projected Gauss-Seidel sweeps, then Newton on the active set (bound normals and clamped friction taken out), project,
-//! exact line search. Each part lowers the objective, so it converges; it ends on the natural residual.
+//! For fixed discs a primal active-set method (for the normals that of Lawson and Hanson 1974): a working set of normal forces and of
+//! friction forces inside their discs (two unknowns) or on their rims (one, the turn along the rim), a direct solution on it, a step up to the
+//! first bound that it meets. At the optimum of a set the contact that overlaps most enters, and friction that is pulled inward leaves
+//! its rim. Each step lowers the objective, so it ends; dependent contacts never share a working set for long, which is what makes
+//! sweeps and projected methods fail here.
 
-/// Limits and tolerance of a solve. Residuals are in meters: how far a contact is from its complementarity.
+/// Tolerance and limits of a solve.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
-    /// Residual of the fixed-disc problem and of the whole \[m\].
-    pub inner: f64,
-    pub outer: f64,
-    pub max_inner: u32,
-    pub max_outer: u32,
-    /// Weight of the proximal term over the normal compliance of a contact.
-    pub proximal: f64,
+    /// How far a contact may be from its complementarity \[m\].
+    pub residual: f64,
+    /// Rounds of the outer loop, and solutions on a working set in each.
+    pub rounds: u32,
+    pub steps: u32,
+}
+
+/// Part of its own radius that a friction force may move along its rim before it is linearized again.
+const TURN: f64 = 0.7;
+/// Rounds after which the radii move halfway only: where friction and pressure feed each other they may swing.
+const SWING: u32 = 3;
+/// Steps after which contacts enter one at a time.
+const EAGER: u32 = 15;
+
+/// What a friction force may do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Friction {
+    /// Its disc is a point.
+    None,
+    Inside,
+    /// On the rim in direction (y, z); stiffness against turning along it.
+    Rim(f64, f64, f64),
+}
+
+/// An unknown of the working set.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// Component 0, 1 or 2 of the contact.
+    Component(usize),
+    /// The turn along the rim with tangent (y, z).
+    Turn(f64, f64),
 }
 
 /// Memory of the solver.
 #[derive(Default)]
 pub(crate) struct Cone {
-    gradient: Vec<f64>,
-    direction: Vec<f64>,
-    image: Vec<f64>,
-    candidate: Vec<f64>,
-    center: Vec<f64>,
-    prox: Vec<f64>,
-    shifted: Vec<f64>,
+    pressed: Vec<bool>,
+    friction: Vec<Friction>,
     disc: Vec<f64>,
-    unknowns: Vec<Unknown>,
+    gradient: Vec<f64>,
+    /// The force about which the working set is linearized, and its solution.
+    base: Vec<f64>,
+    target: Vec<f64>,
+    best: Vec<f64>,
+    /// First component of the contact and kind.
+    unknowns: Vec<(usize, Kind)>,
     dense: Vec<f64>,
     right: Vec<f64>,
-    best: Vec<f64>,
     row: Vec<f64>,
-}
-
-/// An unknown of the active-set system: a row of S combined from at most two components of a contact.
-#[derive(Debug, Clone, Copy)]
-struct Unknown {
-    index: usize,
-    /// Weights of components `index` and `index + 1`.
-    weight: [f64; 2],
-    extra: f64,
+    waiting: Vec<(f64, usize)>,
 }
 
 impl Cone {
@@ -53,261 +72,280 @@ impl Cone {
     pub fn solve(&mut self, s: &[f64], b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {
         let n = b.len();
         let m = n / 3;
-        for v in [
-            &mut self.gradient,
-            &mut self.direction,
-            &mut self.image,
-            &mut self.candidate,
-            &mut self.center,
-            &mut self.prox,
-            &mut self.shifted,
-            &mut self.best,
-            &mut self.row,
-        ] {
+        for v in [&mut self.gradient, &mut self.base, &mut self.target, &mut self.best, &mut self.row] {
             v.clear();
             v.resize(n, 0.0);
         }
+        self.pressed.clear();
+        self.friction.clear();
+        self.friction.resize(m, Friction::None);
         self.disc.clear();
         self.disc.resize(m, 0.0);
         for c in 0..m {
-            let i = 3 * c;
-            // By the normal compliance in all directions: the tangential one may be a thousand times larger (a thread that spins freely),
-            // and as a measure it would tie the normal force to its last value.
-            self.prox[i..i + 3].fill(limits.proximal * s[i * n + i]);
-            l[i] = l[i].max(0.0);
-            self.disc[c] = mu[c] * l[i];
+            l[3 * c] = l[3 * c].max(0.0);
+            self.pressed.push(l[3 * c] > 0.0);
+            self.set_disc(c, mu[c] * l[3 * c], l);
         }
-        let mut reached = f64::INFINITY;
-        for _ in 0..limits.max_outer {
-            project(l, &self.disc);
-            self.center.copy_from_slice(l);
-            for i in 0..n {
-                self.shifted[i] = b[i] - self.prox[i] * self.center[i];
-            }
-            self.refresh_gradient(s, l);
-            self.inner(s, l, limits);
-            // Residual of the problem without the proximal term, with discs that fit the normal forces.
-            for c in 0..m {
-                self.disc[c] = mu[c] * l[3 * c];
-            }
-            for i in 0..n {
-                self.gradient[i] -= self.prox[i] * (l[i] - self.center[i]);
-            }
-            reached = self.residual(s, n, l);
-            if reached < limits.outer {
-                break;
-            }
-        }
-        reached
-    }
-
-    /// gradient = S l + prox l + shifted.
-    fn refresh_gradient(&mut self, s: &[f64], l: &[f64]) {
-        let n = l.len();
-        for i in 0..n {
-            self.gradient[i] = self.shifted[i] + self.prox[i] * l[i] + dot(&s[i * n..i * n + n], l);
-        }
-    }
-
-    fn inner(&mut self, s: &[f64], l: &mut [f64], limits: &Limits) {
-        let n = l.len();
-        let mut best = self.residual(s, n, l);
+        self.find_gradient(s, b, l);
+        let mut reached = self.residual(s, mu, l);
         self.best.copy_from_slice(l);
-        for round in 0..limits.max_inner {
-            if best < limits.inner {
+        for round in 0..limits.rounds {
+            if reached < limits.residual {
                 break;
             }
-            if round > 0 {
-                self.sweep(s, l, false);
-                self.sweep(s, l, true);
-                let r = self.residual(s, n, l);
-                if r < best {
-                    best = r;
-                    self.best.copy_from_slice(l);
-                    if best < limits.inner {
-                        break;
-                    }
-                }
+            self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps);
+            // With discs that fit the normal forces.
+            self.target.copy_from_slice(l);
+            for c in 0..m {
+                let (y, z) = onto_disc(l[3 * c + 1], l[3 * c + 2], mu[c] * l[3 * c]);
+                (self.target[3 * c + 1], self.target[3 * c + 2]) = (y, z);
             }
-            if !self.newton(s, l) {
-                break;
+            let fitted = core::mem::take(&mut self.target);
+            self.find_gradient(s, b, &fitted);
+            let residual = self.residual(s, mu, &fitted);
+            if residual < reached {
+                reached = residual;
+                self.best.copy_from_slice(&fitted);
             }
-            let r = self.residual(s, n, l);
-            if r < best {
-                best = r;
-                self.best.copy_from_slice(l);
+            self.target = fitted;
+            for c in 0..m {
+                let fit = mu[c] * l[3 * c];
+                let slow = round >= SWING && self.disc[c] > 1e-9 * fit;
+                self.set_disc(c, if slow { 0.5 * (fit + self.disc[c]) } else { fit }, l);
             }
         }
         l.copy_from_slice(&self.best);
-        self.refresh_gradient(s, l);
+        reached
     }
 
-    fn diagonal(&self, s: &[f64], n: usize, i: usize) -> f64 {
-        s[i * n + i] + self.prox[i]
+    /// Gives a contact its disc and puts its friction force into it.
+    fn set_disc(&mut self, c: usize, radius: f64, l: &mut [f64]) {
+        let (i, size) = (3 * c, (l[3 * c + 1] * l[3 * c + 1] + l[3 * c + 2] * l[3 * c + 2]).sqrt());
+        self.disc[c] = radius;
+        self.friction[c] = if radius <= 0.0 {
+            (l[i + 1], l[i + 2]) = (0.0, 0.0);
+            Friction::None
+        } else if let Friction::Rim(y, z, turn) = self.friction[c] {
+            (l[i + 1], l[i + 2]) = (radius * y, radius * z);
+            Friction::Rim(y, z, turn)
+        } else if size >= 0.9999 * radius {
+            let (y, z) = (l[i + 1] / size, l[i + 2] / size);
+            (l[i + 1], l[i + 2]) = (radius * y, radius * z);
+            Friction::Rim(y, z, 0.0)
+        } else {
+            Friction::Inside
+        };
     }
 
-    /// Largest violation of complementarity \[m\].
-    fn residual(&self, s: &[f64], n: usize, l: &[f64]) -> f64 {
-        let g = &self.gradient;
+    /// gradient = S l + b.
+    fn find_gradient(&mut self, s: &[f64], b: &[f64], l: &[f64]) {
+        let n = b.len();
+        self.gradient.copy_from_slice(b);
+        for (k, v) in l.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+            for (g, r) in self.gradient.iter_mut().zip(&s[k * n..k * n + n]) {
+                *g += r * v;
+            }
+        }
+    }
+
+    /// Largest violation of complementarity with discs of mu times the normal forces \[m\].
+    fn residual(&self, s: &[f64], mu: &[f64], l: &[f64]) -> f64 {
+        let (n, g) = (l.len(), &self.gradient);
         let mut worst = 0.0f64;
-        for c in 0..n / 3 {
+        for c in 0..mu.len() {
             let i = 3 * c;
-            worst = worst.max(g[i].min(l[i] * self.diagonal(s, n, i)).abs());
-            let d = self.diagonal(s, n, i + 1).max(self.diagonal(s, n, i + 2));
-            let (y, z) = (l[i + 1] - g[i + 1] / d, l[i + 2] - g[i + 2] / d);
-            let (y, z) = onto_disc(y, z, self.disc[c]);
+            worst = worst.max(g[i].min(l[i] * s[i * n + i]).abs());
+            let d = tangential(s, n, i);
+            let (y, z) = onto_disc(l[i + 1] - g[i + 1] / d, l[i + 2] - g[i + 2] / d, mu[c] * l[i]);
             worst = worst.max(d * ((y - l[i + 1]).powi(2) + (z - l[i + 2]).powi(2)).sqrt());
         }
         worst
     }
 
-    /// One projected Gauss-Seidel sweep, forward or back.
-    fn sweep(&mut self, s: &[f64], l: &mut [f64], back: bool) {
-        let n = l.len();
-        let m = n / 3;
-        for q in 0..m {
-            let c = if back { m - 1 - q } else { q };
-            let i = 3 * c;
-            let normal = (l[i] - self.gradient[i] / self.diagonal(s, n, i)).max(0.0);
-            self.change(s, l, i, normal - l[i]);
-            let disc = self.disc[c];
-            if disc <= 0.0 && l[i + 1] == 0.0 && l[i + 2] == 0.0 {
-                continue;
+    /// Minimizes over normal forces and friction forces in the discs as they are. Leaves the gradient at `l`.
+    fn fixed_discs(&mut self, s: &[f64], b: &[f64], l: &mut [f64], tolerance: f64, steps: u32) {
+        let (n, m) = (b.len(), b.len() / 3);
+        let mut eager = true;
+        for step in 0..steps {
+            eager = eager && step < EAGER;
+            if !self.solve_working_set(s, b) {
+                break;
             }
-            let (d1, d2) = (self.diagonal(s, n, i + 1), self.diagonal(s, n, i + 2));
-            let cross = s[(i + 1) * n + i + 2];
-            let det = d1 * d2 - cross * cross;
-            let (g1, g2) = (self.gradient[i + 1], self.gradient[i + 2]);
-            let (mut y, mut z) = (l[i + 1] - (d2 * g1 - cross * g2) / det, l[i + 2] - (d1 * g2 - cross * g1) / det);
-            if y * y + z * z > disc * disc {
-                // On the rim: a few projected gradient steps of the two-by-two problem.
-                let step = 1.0 / d1.max(d2);
-                (y, z) = (l[i + 1], l[i + 2]);
-                for _ in 0..4 {
-                    let (ey, ez) = (y - l[i + 1], z - l[i + 2]);
-                    let (h1, h2) = (g1 + d1 * ey + cross * ez, g2 + cross * ey + d2 * ez);
-                    (y, z) = onto_disc(y - h1 * step, z - h2 * step, disc);
-                }
+            let (part, stuck) = self.first_bound(l);
+            for (v, t) in l.iter_mut().zip(&self.target) {
+                *v = if part < 1.0 { *v + part * (t - *v) } else { *t };
             }
-            self.change(s, l, i + 1, y - l[i + 1]);
-            self.change(s, l, i + 2, z - l[i + 2]);
-        }
-    }
-
-    /// Adds `d` to one unknown and keeps the gradient.
-    #[inline]
-    fn change(&mut self, s: &[f64], l: &mut [f64], i: usize, d: f64) {
-        if d == 0.0 {
-            return;
-        }
-        let n = l.len();
-        l[i] += d;
-        for (g, r) in self.gradient.iter_mut().zip(&s[i * n..i * n + n]) {
-            *g += r * d;
-        }
-        self.gradient[i] += self.prox[i] * d;
-    }
-
-    /// Newton on the active set with exact line search. False when no progress is possible.
-    fn newton(&mut self, s: &[f64], l: &mut [f64]) -> bool {
-        let n = l.len();
-        let m = n / 3;
-        self.unknowns.clear();
-        self.candidate.fill(0.0);
-        for c in 0..m {
-            let i = 3 * c;
-            if l[i] - self.gradient[i] / self.diagonal(s, n, i) > 0.0 {
-                self.unknowns.push(Unknown { index: i, weight: [1.0, 0.0], extra: 0.0 });
-            }
-            let disc = self.disc[c];
-            if disc <= 0.0 {
-                continue;
-            }
-            let d = self.diagonal(s, n, i + 1).max(self.diagonal(s, n, i + 2));
-            let (y, z) = (l[i + 1] - self.gradient[i + 1] / d, l[i + 2] - self.gradient[i + 2] / d);
-            let size = (y * y + z * z).sqrt();
-            if size <= disc {
-                self.unknowns.push(Unknown { index: i + 1, weight: [1.0, 0.0], extra: 0.0 });
-                self.unknowns.push(Unknown { index: i + 2, weight: [1.0, 0.0], extra: 0.0 });
-            } else {
-                // On the rim at direction (y, z): only the turn along the rim is unknown; its curvature adds stiffness.
-                let (cy, cz) = (y / size, z / size);
-                self.candidate[i + 1] = disc * cy;
-                self.candidate[i + 2] = disc * cz;
-                self.unknowns.push(Unknown { index: i + 1, weight: [-cz, cy], extra: (size / disc - 1.0) * d });
-            }
-        }
-        let k = self.unknowns.len();
-        if k > 0 {
-            self.dense.clear();
-            self.dense.resize(k * k, 0.0);
-            self.right.clear();
-            self.right.resize(k, 0.0);
-            for p in 0..k {
-                let u = self.unknowns[p];
-                let i = u.index;
-                let single = u.weight[1] == 0.0;
-                let row: &[f64] = if single {
-                    &s[i * n..i * n + n]
-                } else {
-                    for z in 0..n {
-                        self.row[z] = u.weight[0] * s[i * n + z] + u.weight[1] * s[(i + 1) * n + z];
+            // A contact that entered with others and would leave at once: from now on one at a time.
+            eager = eager && !stuck;
+            let mut turned = false;
+            for c in 0..m {
+                let (i, radius) = (3 * c, self.disc[c]);
+                let size = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2]).sqrt();
+                match self.friction[c] {
+                    Friction::Rim(y, z, turn) if size > 0.0 => {
+                        (l[i + 1], l[i + 2]) = (l[i + 1] * radius / size, l[i + 2] * radius / size);
+                        self.friction[c] = Friction::Rim(l[i + 1] / radius, l[i + 2] / radius, turn);
+                        let moved = ((l[i + 1] - radius * y).powi(2) + (l[i + 2] - radius * z).powi(2)).sqrt();
+                        turned |= tangential(s, n, i) * moved > tolerance;
                     }
-                    &self.row
-                };
-                for q in p..k {
-                    let v = self.unknowns[q];
-                    self.dense[p * k + q] = if v.weight[1] == 0.0 { row[v.index] } else { v.weight[0] * row[v.index] + v.weight[1] * row[v.index + 1] };
+                    Friction::Inside if part < 1.0 && size >= radius * (1.0 - 1e-9) && size > 0.0 => {
+                        let (y, z) = (self.target[i + 1], self.target[i + 2]);
+                        if y * y + z * z > radius * radius {
+                            self.friction[c] = Friction::Rim(l[i + 1] / size, l[i + 2] / size, 0.0);
+                        }
+                    }
+                    _ => {}
                 }
-                self.dense[p * k + p] += self.prox[i] + u.extra;
-                let b = if single { self.shifted[i] } else { u.weight[0] * self.shifted[i] + u.weight[1] * self.shifted[i + 1] };
-                self.right[p] = -b - dot(row, &self.candidate);
-            }
-            if !factor_upper(&mut self.dense, k) {
-                return false;
-            }
-            solve_upper(&self.dense, &mut self.right);
-            for p in 0..k {
-                let u = self.unknowns[p];
-                self.candidate[u.index] += u.weight[0] * self.right[p];
-                if u.weight[1] != 0.0 {
-                    self.candidate[u.index + 1] += u.weight[1] * self.right[p];
+                if self.pressed[c] && self.target[i] < 0.0 && l[i] <= 1e-12 * (l[i] - self.target[i]) {
+                    self.pressed[c] = false;
+                    l[i] = 0.0;
                 }
             }
+            self.find_gradient(s, b, l);
+            let optimal = part >= 1.0 && !turned;
+            let mut released = false;
+            for c in 0..m {
+                if let Friction::Rim(y, z, _) = self.friction[c] {
+                    let pull = -(self.gradient[3 * c + 1] * y + self.gradient[3 * c + 2] * z);
+                    if optimal && pull < -tolerance {
+                        self.friction[c] = Friction::Inside;
+                        released = true;
+                    } else {
+                        self.friction[c] = Friction::Rim(y, z, (pull / self.disc[c]).max(0.0));
+                    }
+                }
+            }
+            if optimal && !released && !self.enter(s, n, tolerance, eager) {
+                break;
+            }
         }
-        project(&mut self.candidate, &self.disc);
-        for i in 0..n {
-            self.direction[i] = self.candidate[i] - l[i];
-        }
-        let (mut slope, mut curvature) = (0.0, 0.0);
-        for i in 0..n {
-            self.image[i] = dot(&s[i * n..i * n + n], &self.direction) + self.prox[i] * self.direction[i];
-            slope += self.gradient[i] * self.direction[i];
-            curvature += self.image[i] * self.direction[i];
-        }
-        if !(curvature > 0.0 && slope < 0.0) {
-            return false;
-        }
-        let t = (-slope / curvature).min(1.0);
-        for i in 0..n {
-            l[i] += t * self.direction[i];
-            self.gradient[i] += t * self.image[i];
-        }
-        true
     }
+
+    /// How far `l` may go toward the target before a bound of the working set is met or a rim has turned far, and whether it may not move at all.
+    fn first_bound(&self, l: &[f64]) -> (f64, bool) {
+        let (mut part, mut stuck) = (1.0f64, false);
+        for c in 0..self.disc.len() {
+            let (i, radius) = (3 * c, self.disc[c]);
+            let (y, z) = (self.target[i + 1], self.target[i + 2]);
+            let (dy, dz) = (y - l[i + 1], z - l[i + 2]);
+            let moved = dy * dy + dz * dz;
+            match self.friction[c] {
+                Friction::Inside if y * y + z * z > radius * radius * (1.0 + 1e-12) => {
+                    // |l + t d| = radius.
+                    let half = l[i + 1] * dy + l[i + 2] * dz;
+                    let inside = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2] - radius * radius).min(0.0);
+                    part = part.min(((half * half - moved * inside).max(0.0).sqrt() - half) / moved).max(0.0);
+                }
+                Friction::Rim(..) if moved > (TURN * radius).powi(2) => part = part.min(TURN * radius / moved.sqrt()),
+                _ => {}
+            }
+            if self.pressed[c] && self.target[i] < 0.0 {
+                let way = if l[i] > 0.0 { l[i] / (l[i] - self.target[i]) } else { 0.0 };
+                stuck |= way == 0.0;
+                part = part.min(way);
+            }
+        }
+        (part, stuck)
+    }
+
+    /// Takes the contacts that overlap most into the working set: those that overlap nearly as much as the worst and do not depend on each
+    /// other, or one. False when none overlaps.
+    fn enter(&mut self, s: &[f64], n: usize, tolerance: f64, eager: bool) -> bool {
+        self.waiting.clear();
+        self.waiting.extend((0..n / 3).filter(|c| !self.pressed[*c] && self.gradient[3 * c] < -tolerance).map(|c| (self.gradient[3 * c], c)));
+        self.waiting.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let mut entered = 0;
+        for k in 0..self.waiting.len() {
+            let (overlap, c) = self.waiting[k];
+            if overlap > 0.3 * self.waiting[0].0 || entered > 0 && !eager {
+                break;
+            }
+            let apart = |d: usize| s[3 * c * n + 3 * d].powi(2) < 0.25 * s[3 * c * n + 3 * c] * s[3 * d * n + 3 * d];
+            if self.waiting[..entered].iter().all(|(_, d)| apart(*d)) {
+                self.pressed[c] = true;
+                self.waiting.swap(entered, k);
+                entered += 1;
+            }
+        }
+        entered > 0
+    }
+
+    /// Minimizes over the working set without bounds; the minimum is left in `target`. False when its matrix is not positive definite.
+    fn solve_working_set(&mut self, s: &[f64], b: &[f64]) -> bool {
+        let n = b.len();
+        self.unknowns.clear();
+        self.base.fill(0.0);
+        for c in 0..n / 3 {
+            let i = 3 * c;
+            if self.pressed[c] {
+                self.unknowns.push((i, Kind::Component(0)));
+            }
+            match self.friction[c] {
+                Friction::None => {}
+                Friction::Inside => self.unknowns.extend([(i, Kind::Component(1)), (i, Kind::Component(2))]),
+                Friction::Rim(y, z, _) => {
+                    self.unknowns.push((i, Kind::Turn(-z, y)));
+                    (self.base[i + 1], self.base[i + 2]) = (self.disc[c] * y, self.disc[c] * z);
+                }
+            }
+        }
+        let base = core::mem::take(&mut self.base);
+        self.find_gradient(s, b, &base);
+        let k = self.unknowns.len();
+        self.dense.clear();
+        self.dense.resize(k * k, 0.0);
+        self.right.clear();
+        for p in 0..k {
+            let (i, kind) = self.unknowns[p];
+            let (row, right): (&[f64], f64) = match kind {
+                Kind::Component(a) => (&s[(i + a) * n..(i + a + 1) * n], self.gradient[i + a]),
+                Kind::Turn(y, z) => {
+                    for (v, (r1, r2)) in self.row.iter_mut().zip(s[(i + 1) * n..(i + 2) * n].iter().zip(&s[(i + 2) * n..(i + 3) * n])) {
+                        *v = y * r1 + z * r2;
+                    }
+                    (&self.row, y * self.gradient[i + 1] + z * self.gradient[i + 2])
+                }
+            };
+            self.right.push(-right);
+            for (d, (j, other)) in self.dense[p * k + p..(p + 1) * k].iter_mut().zip(&self.unknowns[p..]) {
+                *d = match other {
+                    Kind::Component(a) => row[j + a],
+                    Kind::Turn(y, z) => y * row[j + 1] + z * row[j + 2],
+                };
+            }
+            if let (Kind::Turn(..), Friction::Rim(_, _, turn)) = (kind, self.friction[i / 3]) {
+                self.dense[p * k + p] += turn;
+            }
+        }
+        let positive = factor_upper(&mut self.dense, k);
+        if positive {
+            solve_upper(&self.dense, &mut self.right);
+            self.target.copy_from_slice(&base);
+            for ((i, kind), x) in self.unknowns.iter().zip(&self.right) {
+                match kind {
+                    Kind::Component(a) => self.target[i + a] += x,
+                    Kind::Turn(y, z) => {
+                        self.target[i + 1] += y * x;
+                        self.target[i + 2] += z * x;
+                    }
+                }
+            }
+        }
+        self.base = base;
+        positive
+    }
+}
+
+/// The larger tangential compliance of the contact whose components start at `i`.
+#[inline]
+fn tangential(s: &[f64], n: usize, i: usize) -> f64 {
+    s[(i + 1) * n + i + 1].max(s[(i + 2) * n + i + 2])
 }
 
 #[inline]
 fn onto_disc(y: f64, z: f64, radius: f64) -> (f64, f64) {
     let size = (y * y + z * z).sqrt();
     if size > radius { (y * radius / size, z * radius / size) } else { (y, z) }
-}
-
-fn project(l: &mut [f64], disc: &[f64]) {
-    for (c, radius) in l.chunks_exact_mut(3).zip(disc) {
-        c[0] = c[0].max(0.0);
-        (c[1], c[2]) = onto_disc(c[1], c[2], *radius);
-    }
 }
 
 /// Dot product in eight interleaved sums: a fixed order that vectorizes.
@@ -394,8 +432,7 @@ mod tests {
                 let (s, b) = problem(m, rank, &mut seed);
                 let n = 3 * m;
                 let mut l = vec![0.0; n];
-                let limits = Limits { inner: 1e-9, outer: 1e-8, max_inner: 60, max_outer: 400, proximal: 0.03 };
-                let r = cone.solve(&s, &b, &vec![mu; m], &mut l, &limits);
+                let r = cone.solve(&s, &b, &vec![mu; m], &mut l, &Limits { residual: 1e-8, rounds: 100, steps: 200 });
                 assert!(r < 1e-6, "{m} contacts, mu {mu}: residual {r:e}");
                 for c in 0..m {
                     let g = |i: usize| b[i] + dot(&s[i * n..i * n + n], &l);

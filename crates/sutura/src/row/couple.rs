@@ -213,13 +213,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             }
         }
     }
-    let limits = Limits {
-        inner: params::CONTACT_TOLERANCE * smallest,
-        outer: 2.0 * params::CONTACT_TOLERANCE * smallest,
-        max_inner: 20,
-        max_outer: 6,
-        proximal: params::PROXIMAL,
-    };
+    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60 };
     *left = cone.solve(s, b, mu, force, &limits) / smallest;
     right.clear();
     right.resize(step.len(), DVec3::ZERO);

@@ -8,7 +8,7 @@ use crate::state::{GripState, LoadState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version.
-const MAGIC: &[u8; 8] = b"sutura\x01\0";
+const MAGIC: &[u8; 8] = b"sutura\x02\0";
 
 /// Something that is written and read back without loss.
 trait Bytes: Sized {
@@ -180,6 +180,7 @@ structure!(GripState { rod, index, hold, drive, ramp, taken_at, taken_pose, take
 structure!(State {
     time,
     last_h,
+    calm,
     position,
     velocity,
     orientation,

@@ -41,9 +41,18 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
     }
 }
 
+/// Accepted substeps of one length before twice the length is tried again.
+const CALM: u32 = 6;
+
 /// Advances from `t` by `h`, or in two halves when the result is not acceptable. False when it got stuck.
 #[allow(clippy::too_many_arguments, reason = "the recursion on halves hands all of them on")]
 fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, t: f64, h: f64, depth: u32, report: &mut StepReport) -> bool {
+    // Where substeps had to be short a while ago they start short.
+    if depth < model.settings.halvings && state.last_h > 0.0 && h > state.last_h * if state.calm < CALM { 1.5 } else { 3.0 } {
+        let half = 0.5 * h;
+        return advance(model, state, scratch, interval, t, half, depth + 1, report)
+            && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
+    }
     save(state, scratch, depth);
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
@@ -60,7 +69,9 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     };
     match verdict {
         Ok(clearance) => {
+            let last = state.last_h;
             accept(model, state, scratch, h);
+            state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
             state.time = t + h;
             report.substeps += 1;
             report.residual = report.residual.max(outcome.residual);
@@ -76,6 +87,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
         Err(reason) => {
             restore(state, scratch, depth);
             report.rejected += 1;
+            (state.last_h, state.calm) = (0.5 * h, 0);
             if depth < model.settings.halvings {
                 let half = 0.5 * h;
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
@@ -84,6 +96,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
             let kind = if outcome.finite { IncidentKind::Stuck { reason } } else { IncidentKind::NotFinite };
             report.incidents.push(Incident { time: t, kind });
             report.converged = false;
+            state.last_h = 0.0;
             // Rest: what moved into this state must not push again.
             state.velocity.fill(DVec3::ZERO);
             state.angular_velocity.fill(DVec3::ZERO);

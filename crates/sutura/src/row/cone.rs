@@ -19,6 +19,8 @@ pub(crate) struct Limits {
     /// Rounds of the outer loop, and solutions on a working set in each.
     pub rounds: u32,
     pub steps: u32,
+    /// Multiplications in all factorizations of a solve, about.
+    pub work: f64,
 }
 
 /// Part of its own radius that a friction force may move along its rim before it is linearized again.
@@ -64,6 +66,8 @@ pub(crate) struct Cone {
     right: Vec<f64>,
     row: Vec<f64>,
     waiting: Vec<(f64, usize)>,
+    /// Multiplications that may still be spent.
+    left: f64,
 }
 
 impl Cone {
@@ -89,8 +93,9 @@ impl Cone {
         self.find_gradient(s, b, l);
         let mut reached = self.residual(s, mu, l);
         self.best.copy_from_slice(l);
+        self.left = limits.work;
         for round in 0..limits.rounds {
-            if reached < limits.residual {
+            if reached < limits.residual || self.left < 0.0 {
                 break;
             }
             self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps);
@@ -168,7 +173,7 @@ impl Cone {
         let mut eager = true;
         for step in 0..steps {
             eager = eager && step < EAGER;
-            if !self.solve_working_set(s, b) {
+            if self.left < 0.0 || !self.solve_working_set(s, b) {
                 break;
             }
             let (part, stuck) = self.first_bound(l);
@@ -292,6 +297,7 @@ impl Cone {
         let base = core::mem::take(&mut self.base);
         self.find_gradient(s, b, &base);
         let k = self.unknowns.len();
+        self.left -= (k * k * k) as f64 / 6.0 + (k * n) as f64;
         self.dense.clear();
         self.dense.resize(k * k, 0.0);
         self.right.clear();
@@ -432,7 +438,7 @@ mod tests {
                 let (s, b) = problem(m, rank, &mut seed);
                 let n = 3 * m;
                 let mut l = vec![0.0; n];
-                let r = cone.solve(&s, &b, &vec![mu; m], &mut l, &Limits { residual: 1e-8, rounds: 100, steps: 200 });
+                let r = cone.solve(&s, &b, &vec![mu; m], &mut l, &Limits { residual: 1e-8, rounds: 100, steps: 200, work: f64::INFINITY });
                 assert!(r < 1e-6, "{m} contacts, mu {mu}: residual {r:e}");
                 for c in 0..m {
                     let g = |i: usize| b[i] + dot(&s[i * n..i * n + n], &l);

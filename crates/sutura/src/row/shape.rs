@@ -43,6 +43,8 @@ pub(crate) struct ShapeRow {
     /// Whether it slid in the last substep, and at the last look.
     slid_before: bool,
     sliding: bool,
+    /// Left out of the small problem, it was violated.
+    wanted: bool,
     /// Friction force at the start of the substep, in the tangent plane then, and slip that was still to be undone.
     anchor: DVec3,
     drift: DVec3,
@@ -127,7 +129,9 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 .iter()
                 .take_while(|c| (c.shape, c.element) == (*slot, e as u32))
                 .filter(|c| (c.s - s).abs() < 0.3)
-                .min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()));
+                .min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()))
+                // The half of a post that it touches now may be the other one.
+                .or_else(|| old.iter().find(|c| c.element == e as u32 && c.s == s && c.shape != *slot && c.normal.dot(before.normal) > 0.9999));
             let normal = match known {
                 Some(c) if c.normal.dot(before.normal) < 0.0 => -before.normal,
                 _ => before.normal,
@@ -151,6 +155,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 firm: normal_force > params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
                 slid_before: known.is_some_and(|c| c.sliding),
                 sliding: known.is_some_and(|c| c.sliding),
+                wanted: false,
                 anchor: known.map_or(DVec3::ZERO, |c| across(c.friction)),
                 drift: known.map_or(DVec3::ZERO, |c| across(c.drift)),
                 entered: 0.0,
@@ -178,6 +183,16 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
             add(1.0);
         }
     }
+    merge(&mut rows.shapes);
+}
+
+/// Leaves one of rows that say the same of two shapes that lie in one another, such as the halves of a post: the one that carried force.
+fn merge(rows: &mut Vec<ShapeRow>) {
+    rows.sort_unstable_by(|a, b| a.element.cmp(&b.element).then(a.s.total_cmp(&b.s)).then(b.carried.total_cmp(&a.carried)).then(a.shape.cmp(&b.shape)));
+    rows.dedup_by(|b, a| {
+        let place = a.element == b.element && (a.s - b.s).abs() < 1e-3;
+        place && (a.start_gap - b.start_gap).abs() < 1e-3 * a.radius && a.normal.dot(b.normal) > 0.9999
+    });
 }
 
 /// Looks where the row is now; its point on the centerline.
@@ -247,7 +262,8 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
         forces(model, state, &start, row, first);
-        if row.normal_force <= 0.0 && !first {
+        // Much deeper than its force says, its law is far from the parabola's tangent.
+        if row.gap < -3.0 * (row.carried / row.hardness).sqrt() || row.normal_force <= 0.0 && !first {
             *row = ShapeRow { firm: false, ..before };
         }
     }
@@ -292,7 +308,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let pushed = slider.map_or(DVec3::ZERO, |j| sliders.direction(j) * sliders.step(j));
         let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - pushed;
         let gap = row.gap + row.normal.dot(moved);
-        if row.normal_force <= 0.0 && gap.min(row.gap) > params::PRUNE * row.radius {
+        if row.normal_force <= 0.0 && !row.wanted && gap > params::PRUNE * row.radius {
             (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
             continue;
         }
@@ -302,8 +318,8 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let arm = n * -row.radius;
         let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
         let slip = slip(state, start, row) + moved + turned.cross(arm) - row.anchor * row.entered;
-        // An overlap from before is pushed out over a few substeps.
-        let allowed = if row.start_gap < 0.0 { row.start_gap * params::RECOVER } else { 0.0 };
+        // An overlap from before, beyond what the force carried before explains, is pushed out over a few substeps.
+        let allowed = (row.start_gap + (row.carried / row.hardness).sqrt()).min(0.0) * params::RECOVER;
         let end = Endpoint::new(e, row.s, axes, arm, row.along);
         entries.push(Entry {
             source: Source::Shape(k as u32),
@@ -332,18 +348,22 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch) -> bo
     let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     let largest = rows.shapes.iter().map(|r| r.normal_force).fold(0.0, f64::max);
-    rows.shapes.iter().all(|row| {
+    let mut settled = true;
+    for row in &mut rows.shapes {
         let mut now = *row;
         if row.firm {
             forces(model, state, &start, &mut now, false);
             let predicted = row.normal_force - row.stiffness * (now.gap - row.gap);
             // A row that was to stick and would slide has kept what it holds from starting.
-            (now.normal_force - predicted.max(0.0)).abs() <= 0.02 * largest && (row.sliding || !now.sliding)
-        } else {
+            settled &= (now.normal_force - predicted.max(0.0)).abs() <= 0.02 * largest && (row.sliding || !now.sliding);
+        } else if row.normal_force <= 0.0 {
             look(model, state, &mut now);
-            row.normal_force > 0.0 || now.gap > row.start_gap.min(0.0) - params::SLACK * row.radius
+            if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
+                (row.wanted, settled) = (true, false);
+            }
         }
-    })
+    }
+    settled
 }
 
 /// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed with.
@@ -375,5 +395,6 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
             });
         }
     }
+    contacts.sort_unstable_by(|a, b| (a.shape, a.element).cmp(&(b.shape, b.element)).then(a.s.total_cmp(&b.s)));
     state.shape_contacts = contacts;
 }

@@ -45,6 +45,8 @@ pub(crate) struct ThreadRow {
     drift: DVec3,
     /// Force on a along the axes \[N\].
     pub force: DVec3,
+    /// Left out of the small problem, it was violated.
+    wanted: bool,
     /// Clearance already missing at the start: it is won back over a few substeps, not at once.
     start_gap: f64,
 }
@@ -71,6 +73,7 @@ impl ThreadRow {
             anchor: DVec3::ZERO,
             drift: DVec3::ZERO,
             force: DVec3::ZERO,
+            wanted: false,
             start_gap: 0.0,
         }
     }
@@ -220,9 +223,8 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
         let moved = d(row.a, row.s) - d(row.b, row.t);
         let n = row.axes[0];
-        let now = n.dot(row.apart(&state.position)) - row.sum;
-        let gap = now + n.dot(moved);
-        if row.force.x <= 0.0 && gap.min(now) > params::PRUNE * row.radii[0].min(row.radii[1]) {
+        let gap = n.dot(row.apart(&state.position)) - row.sum + n.dot(moved);
+        if row.force.x <= 0.0 && !row.wanted && gap > params::PRUNE * row.radii[0].min(row.radii[1]) {
             row.force = DVec3::ZERO;
             continue;
         }
@@ -270,7 +272,7 @@ pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
     scale
 }
 
-/// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was added.
+/// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was added, or when one was left out of the small problem.
 pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { candidates, start, rows, .. } = scratch;
     let x = &state.position;
@@ -303,15 +305,20 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
     }
     merge(fresh);
     let known = rows.threads.len();
+    let mut found = false;
     for row in fresh.iter() {
         let same = rows.threads[..known]
-            .iter()
-            .any(|r| r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999);
-        if !same {
-            rows.threads.push(*row);
+            .iter_mut()
+            .find(|r| r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999);
+        match same {
+            Some(old) => found |= !core::mem::replace(&mut old.wanted, true),
+            None => {
+                rows.threads.push(*row);
+                found = true;
+            }
         }
     }
-    rows.threads.len() > known
+    found
 }
 
 /// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left undone.

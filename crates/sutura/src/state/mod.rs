@@ -12,6 +12,8 @@ pub struct State {
     pub(crate) time: f64,
     /// Length of the last accepted substep \[s\]; 0 before the first.
     pub(crate) last_h: f64,
+    /// Accepted substeps since their length last changed.
+    pub(crate) calm: u32,
 
     pub(crate) position: Vec<DVec3>,
     pub(crate) velocity: Vec<DVec3>,
@@ -110,6 +112,7 @@ impl State {
         let State {
             time,
             last_h,
+            calm,
             position,
             velocity,
             orientation,
@@ -126,6 +129,7 @@ impl State {
         } = from;
         self.time = *time;
         self.last_h = *last_h;
+        self.calm = *calm;
         self.position.clone_from(position);
         self.velocity.clone_from(velocity);
         self.orientation.clone_from(orientation);

@@ -93,7 +93,7 @@ pub(crate) const CONTACT_TOLERANCE: f64 = 1e-3;
 /// Multiplications that a contact solve may spend at first.
 pub(crate) const CONTACT_WORK: f64 = 3e6;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
-pub(crate) const CONTACT_LEFT: f64 = 0.02;
+pub(crate) const CONTACT_LEFT: f64 = 0.06;
 
 impl Settings {
     pub(crate) fn validate(&self) -> Result<(), Error> {

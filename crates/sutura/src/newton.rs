@@ -53,7 +53,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let mut waiting = !exact;
     let mut before = f64::INFINITY;
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
-    let (mut gained, mut scale) = (0.0, 1.0);
+    let (mut gained, mut scale) = (0.0_f64, 1.0);
     while out.iterations < settings.newton_max {
         out.iterations += 1;
         row::shape::review(model, state, scratch, out.iterations == 1);
@@ -65,7 +65,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             if !exact {
                 factor(model, state, scratch, h, Hessian::Positive, first);
             }
-            if first || taken < 0.2 || !(gained > 0.0) {
+            if first || taken < 0.2 || gained <= 0.0 || gained.is_nan() {
                 break;
             }
             // Where the force along the last step has turned round the step went too far: contacts opened, closed or began to slide on
@@ -106,7 +106,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             return out;
         }
         let settled = trusted && out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
-        if scale >= 1.0 && settled && row::couple::solved(scratch) && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch) {
+        if scale >= 1.0 && settled && row::couple::solved(scratch) && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch)
+        {
             out.converged = true;
             break;
         }

@@ -71,6 +71,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
         Ok(clearance) => {
             let last = state.last_h;
             accept(model, state, scratch, h);
+            state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
             state.time = t + h;
             report.substeps += 1;
@@ -114,7 +115,7 @@ fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 
 fn save(state: &State, scratch: &mut Scratch, depth: u32) {
     let depth = depth as usize;
-    if scratch.saved.len() <= depth {
+    while scratch.saved.len() <= depth {
         scratch.saved.push(State::default());
     }
     scratch.saved[depth].copy_from(state);
@@ -293,7 +294,6 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
     row::thread::finish(state, scratch);
     row::shape::finish(model, state, scratch);
     reactions(model, state, scratch, h);
-    state.last_h = h;
 }
 
 /// Bend and twist beyond yield become permanent (return mapping with isotropic hardening, bending radially in the two directions).

@@ -40,6 +40,9 @@ const SHAPE: Error = Error::StaleHandle { what: "shape" };
 const GRIP: Error = Error::StaleHandle { what: "grip" };
 const LOAD: Error = Error::StaleHandle { what: "load" };
 
+/// Substeps that one call may take.
+const MOST_SUBSTEPS: f64 = 1e6;
+
 impl World {
     /// An empty world.
     pub fn new(settings: Settings) -> Result<Self, Error> {
@@ -458,6 +461,10 @@ impl World {
         let mut report = StepReport { time: start, ..StepReport::default() };
         if !(dt.is_finite() && dt > 0.0) {
             report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is not a finite number > 0" } });
+            return report;
+        }
+        if dt / self.model.settings.substep > MOST_SUBSTEPS {
+            report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is more than a million substeps" } });
             return report;
         }
         self.report_teleports(dt, &mut report);

@@ -580,7 +580,7 @@ fn full_world() -> World {
     for _ in 0..6 {
         world.step(DT);
     }
-    assert!(world.contacts().count() > 3, "nothing touches");
+    assert!(world.contacts().count() > 3, "{} touch", world.contacts().count());
     world
 }
 

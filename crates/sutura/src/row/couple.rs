@@ -217,7 +217,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         }
     }
     // More effort where it did not suffice in the iterations before.
-    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK * f64::from(1 << (2 * (*short).min(2))) };
+    let limits =
+        Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK * f64::from(1 << (2 * (*short).min(2))) };
     *left = cone.solve(s, b, mu, force, &limits) / smallest;
     *short += u32::from(*left > params::CONTACT_LEFT);
     right.clear();
@@ -316,4 +317,3 @@ fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], j
         }
     }
 }
-

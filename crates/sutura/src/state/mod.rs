@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 pub struct State {
     /// Simulated time \[s\].
     pub(crate) time: f64,
-    /// Length of the last accepted substep \[s\]; 0 before the first.
+    /// Length of the last substep that was accepted as a part of a halved one \[s\]; 0 after a whole one.
     pub(crate) last_h: f64,
     /// Accepted substeps since their length last changed.
     pub(crate) calm: u32,

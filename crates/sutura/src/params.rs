@@ -65,7 +65,7 @@ impl Default for Settings {
 pub(crate) const CONTACT_STIFFNESS: f64 = 4.0;
 
 /// Normal force over E r^2 beyond which a contact with a shape that stays as it is goes into the rods' matrix.
-pub(crate) const FIRM: f64 = 1e-7;
+pub(crate) const FIRM: f64 = 1e-8;
 
 /// How far beyond the predicted motion candidates are sought, in radii.
 pub(crate) const REACH: f64 = 1.5;

@@ -412,7 +412,6 @@ fn time_steps_that_are_tiny() {
 const MANY: u32 = 20_000;
 
 #[test]
-#[ignore = "dt 1e9 s is 2.4e11 substeps, and as u32 4.3e9: a hang; a substep of 1e-300 s too"]
 fn time_steps_that_are_huge() {
     for (dt, substep) in [(1e9, 1.0 / 240.0), (1e300, 1.0 / 240.0), (DT, 1e-300)] {
         let (mut world, _) = thread(Settings { substep, gravity: DVec3::ZERO, ..Settings::default() });
@@ -535,7 +534,6 @@ fn a_load_that_was_absurd() {
 }
 
 #[test]
-#[ignore = "force 1e30 N: NaN in the positions after two steps and no NotFinite; newton.rs loses a NaN that a finite number follows (max_or_nan, and f64::max on the residual)"]
 fn a_healthy_thread_does_not_hide_an_absurd_one() {
     for x in [1e30, 1e60, 1e80, 1e100, 1e120, 1e140, 1e200, 1e300] {
         for stretch in [Stretch::Elastic, Stretch::Inextensible] {
@@ -658,7 +656,6 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    #[ignore = "large numbers: a panic (row/thread.rs, merge: places are finite), a NaN that is taken (newton.rs, max_or_nan), a hang (newton.rs: a step whose work is negative is shortened by nothing, for ever)"]
     fn a_snapshot_with_a_flipped_bit(at in any::<prop::sample::Index>(), bit in 0u32..8) {
         let mut world = full_world();
         let mut bytes = world.snapshot();
@@ -668,7 +665,6 @@ proptest! {
     }
 
     #[test]
-    #[ignore = "large numbers: a panic (row/thread.rs, merge: places are finite), a NaN that is taken (newton.rs, max_or_nan), a hang (newton.rs: a step whose work is negative is shortened by nothing, for ever)"]
     fn a_snapshot_with_a_number_exchanged(at in any::<prop::sample::Index>(), new in prop_oneof![
         Just(f64::NAN.to_bits()), Just(f64::INFINITY.to_bits()), Just(f64::MAX.to_bits()), Just((-1e200f64).to_bits()), Just(0u64), Just(u64::MAX), any::<u64>(),
     ]) {

@@ -355,7 +355,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch) -> bo
             forces(model, state, &start, &mut now, false);
             let predicted = row.normal_force - row.stiffness * (now.gap - row.gap);
             // A row that was to stick and would slide has kept what it holds from starting.
-            settled &= (now.normal_force - predicted.max(0.0)).abs() <= 0.02 * largest && (row.sliding || !now.sliding);
+            settled &= (now.normal_force - predicted.max(0.0)).abs() <= 0.002 * largest && (row.sliding || !now.sliding);
         } else if row.normal_force <= 0.0 {
             look(model, state, &mut now);
             if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {

@@ -8,8 +8,8 @@
 //! For fixed discs a primal active-set method (for the normals that of Lawson and Hanson 1974): a working set of normal forces and of
 //! friction forces inside their discs (two unknowns) or on their rims (one, the turn along the rim), a direct solution on it, a step up to the
 //! first bound that it meets. At the optimum of a set the contact that overlaps most enters, and friction that is pulled inward leaves
-//! its rim. Each step lowers the objective, so it ends; dependent contacts never share a working set for long, which is what makes
-//! sweeps and projected methods fail here.
+//! its rim. Up to the return to a rim each step lowers the objective; a budget ends what does not. Dependent contacts never share a working set
+//! for long, which is what makes sweeps and projected methods fail here.
 
 /// Tolerance and limits of a solve.
 #[derive(Debug, Clone, Copy)]

@@ -1,16 +1,16 @@
-//! Contact of thread with thread, solved in the threads' own compliance.
+//! Contact of thread with thread: the rows, their memory, and where new ones are needed. Their forces come from the small contact problem
+//! ([`couple`]).
 //!
 //! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two pieces too near,
-//! another row is added at their present closest places. With W the inverse of the rods' Newton matrix and G the rows' Jacobian,
-//! `S = G W G^T` is the compliance between contacts. Newton's step without contact, then the contact forces from S ([`cone`]), then the
-//! step that they cause. (A contact sweep that moves particles by their own inertia, m / h^2, cannot hold: the rod behind them is 10^5
-//! times stiffer.)
+//! another row is added at their present closest places.
 //!
 //! Friction acts at the surface, with its arm on the frame, but does not turn a thread about its own axis: threads slide on each other and do
 //! not roll. (Spin has next to no inertia and, on a thread whose ends are free to turn, no stiffness: the compliance it adds to the small
 //! problem is a thousand times the rest, and the solve does not converge.)
 //!
 //! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the next substep.
+//!
+//! [`couple`]: crate::row::couple
 
 use crate::collide::{relative_motion, segment};
 use crate::math::log;

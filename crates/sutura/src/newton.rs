@@ -30,6 +30,12 @@ const SLOW: f64 = 0.3;
 /// Part of the stiffness along a step that the positive matrix may have left out where its step is taken for the last one.
 const TRUSTED: f64 = 0.1;
 
+/// Move of the last iteration where there are contacts, in radii, that counts as none.
+const NEAR: f64 = 0.03;
+
+/// Least part of an iteration that the next one is taken to do, where they shrink fast.
+const SLACKEN: f64 = 0.2;
+
 /// How a Newton solve ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
@@ -51,7 +57,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
-    let mut before = f64::INFINITY;
+    let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
     while out.iterations < settings.newton_max {
@@ -70,7 +76,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             }
             // Where the force along the last step has turned round the step went too far: contacts opened, closed or began to slide on
             // the way. Go back to where a straight line between the two forces says that it vanishes.
-            let left = work(scratch);
+            let left = work_left(model, state, scratch);
             if left > -OVERSHOOT * gained {
                 break;
             }
@@ -89,7 +95,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         Sliders::factor(scratch);
         scratch.rows.sliders.couple(&mut scratch.step, false);
         row::couple::couple(state, scratch);
-        gained = work(scratch);
+        gained = work_ahead(model, state, scratch);
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
         apply(model, state, scratch, scale);
@@ -98,14 +104,17 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
             (waiting, exact) = (false, true);
         }
-        before = out.turn;
         out.residual = max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
         let stretched = inextensible_error(model, state);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
         }
-        let settled = trusted && out.turn < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual < 0.03);
+        // What the next iteration would do, going by what this one did after the one before.
+        let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
+        (before, moved_before) = (out.turn, out.residual);
+        let settled =
+            trusted && out.turn * rate < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual * rate < NEAR);
         if scale >= 1.0 && settled && row::couple::solved(scratch) && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch)
         {
             out.converged = true;
@@ -131,6 +140,38 @@ fn carried_forces(model: &Model, state: &State, scratch: &mut Scratch) {
 fn work(scratch: &Scratch) -> f64 {
     let own: f64 = scratch.rhs.iter().zip(&scratch.step).map(|(r, z)| r.dot(*z)).sum();
     own + row::couple::work(scratch) + scratch.rows.sliders.work()
+}
+
+/// Linear change of an element's strain along the last step.
+fn strain_change(state: &State, step: &[DVec3], e: usize) -> DVec3 {
+    let d = state.position[e + 1] - state.position[e];
+    state.orientation[e].conjugate() * (step[2 * e + 2] - step[2 * e] + d.cross(step[2 * e + 1]))
+}
+
+/// Work along the last step of what `excess` says that the stretch and shear forces of each element are too large by.
+fn work_of_excess(state: &State, scratch: &Scratch, excess: impl Fn(usize, DVec3) -> DVec3) -> f64 {
+    let elements = scratch.rods.iter().flat_map(|(rod, _)| rod.start..rod.end - 1);
+    let on = |e: usize| {
+        let change = strain_change(state, &scratch.step, e);
+        excess(e, change).dot(change)
+    };
+    elements.map(on).sum()
+}
+
+/// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds up.
+fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
+    work(scratch) - work_of_excess(state, scratch, |e, change| model.stretch_stiffness[e] * change)
+}
+
+/// Work of the forces at the iterate along the last step, with the stretch and shear forces that the step predicted: those of the strain itself hold an
+/// error of second order in the turn, which the next step takes away and which outweighs all else.
+fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
+    let error = |e: usize, _| {
+        let force = element_strain(model, state, e) * model.stretch_stiffness[e];
+        let tension = if model.inextensible[e] { 0.0 } else { scratch.tension[e] };
+        force - scratch.shear[e].extend(tension)
+    };
+    work(scratch) + work_of_excess(state, scratch, error)
 }
 
 /// Assembles and factors. False when a pivot is not positive.
@@ -228,8 +269,7 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
         for e in rod.start..rod.end - 1 {
             // Predicted force: strain now plus its linear change.
             let (q, d) = (state.orientation[e], state.position[e + 1] - state.position[e]);
-            let change = scratch.step[2 * e + 2] - scratch.step[2 * e] + d.cross(scratch.step[2 * e + 1]);
-            let strain = q.conjugate() * (d + change * scale) - DVec3::new(0.0, 0.0, model.rest_length[e]);
+            let strain = q.conjugate() * d + strain_change(state, &scratch.step, e) * scale - DVec3::new(0.0, 0.0, model.rest_length[e]);
             let f = strain * model.stretch_stiffness[e];
             scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + f.z } else { f.z };
             scratch.shear[e] = f.truncate();

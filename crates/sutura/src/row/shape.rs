@@ -69,6 +69,10 @@ pub(crate) struct ShapeRow {
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
 
+/// Part of the limit of friction by which a row that sticks has to go beyond it before it slides. Where many stick at their limit they
+/// would otherwise not settle.
+const CLING: f64 = 2e-3;
+
 impl ShapeRow {
     /// Its element, when it may enter the small problem.
     pub fn entering(&self) -> Option<usize> {
@@ -239,7 +243,7 @@ fn forces(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, f
     let trial = row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * k;
     let limit = row.mu[usize::from(row.slid_before)] * pressed;
     let size = trial.length();
-    if size <= limit {
+    if size <= if row.sliding { limit } else { limit * (1.0 + CLING) } {
         row.slid = DVec3::ZERO;
         row.sliding = false;
         row.friction = trial;

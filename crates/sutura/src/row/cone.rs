@@ -8,8 +8,13 @@
 //! For fixed discs a primal active-set method (for the normals that of Lawson and Hanson 1974): a working set of normal forces and of
 //! friction forces inside their discs (two unknowns) or on their rims (one, the turn along the rim), a direct solution on it, a step up to the
 //! first bound that it meets. At the optimum of a set the contact that overlaps most enters, and friction that is pulled inward leaves
-//! its rim. Up to the return to a rim each step lowers the objective; a budget ends what does not. Dependent contacts never share a working set
-//! for long, which is what makes sweeps and projected methods fail here.
+//! its rim. The factorization follows the set row by row ([`Ldl`]). Up to the return to a rim each step lowers the objective; a budget ends what
+//! does not. Dependent contacts never share a working set for long, which is what makes sweeps and projected methods fail here.
+//!
+//! The radii's loop alone would take some eight rounds. Once a set is found, one Newton step solves it with every radius following its normal
+//! force (a nonsymmetric system); mostly that is the answer.
+
+use crate::row::ldl::{Ldl, dot};
 
 /// Tolerance and limits of a solve.
 #[derive(Debug, Clone, Copy)]
@@ -27,8 +32,12 @@ pub(crate) struct Limits {
 const TURN: f64 = 0.7;
 /// Rounds after which the radii move halfway only: where friction and pressure feed each other they may swing.
 const SWING: u32 = 3;
-/// Steps after which contacts enter one at a time.
-const EAGER: u32 = 15;
+/// Steps in which several contacts may enter and several bounds be met at once.
+const EAGER: u32 = 30;
+/// Part of a step up to which all bounds on the way count as met at once.
+const TOGETHER: f64 = 0.1;
+/// Turn of a rim \[rad\], and change of its stiffness over what the diagonal was, beyond which its row is factored again.
+const STALE: f64 = 0.01;
 
 /// What a friction force may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,13 +49,31 @@ enum Friction {
     Rim(f64, f64, f64),
 }
 
-/// An unknown of the working set.
+/// An unknown of the working set: a component (0, 1 or 2) of a contact, or the turn along its rim with tangent (y, z).
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Kind {
-    /// Component 0, 1 or 2 of the contact.
     Component(usize),
-    /// The turn along the rim with tangent (y, z).
     Turn(f64, f64),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Unknown {
+    /// First component of its contact.
+    contact: usize,
+    kind: Kind,
+    /// Stiffness against turning, as factored.
+    turn: f64,
+}
+
+impl Unknown {
+    /// Its entry in a vector of components.
+    #[inline]
+    fn of(&self, v: &[f64]) -> f64 {
+        match self.kind {
+            Kind::Component(a) => v[self.contact + a],
+            Kind::Turn(y, z) => y * v[self.contact + 1] + z * v[self.contact + 2],
+        }
+    }
 }
 
 /// Memory of the solver.
@@ -56,16 +83,17 @@ pub(crate) struct Cone {
     friction: Vec<Friction>,
     disc: Vec<f64>,
     gradient: Vec<f64>,
-    /// The force about which the working set is linearized, and its solution.
-    base: Vec<f64>,
+    /// Solution on the working set.
     target: Vec<f64>,
     best: Vec<f64>,
-    /// First component of the contact and kind.
-    unknowns: Vec<(usize, Kind)>,
-    dense: Vec<f64>,
+    /// The working set as factored.
+    unknowns: Vec<Unknown>,
+    factor: Ldl,
     right: Vec<f64>,
     row: Vec<f64>,
+    dense: Vec<f64>,
     waiting: Vec<(f64, usize)>,
+    have: Vec<u8>,
     /// Multiplications that may still be spent.
     left: f64,
 }
@@ -76,10 +104,12 @@ impl Cone {
     pub fn solve(&mut self, s: &[f64], b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {
         let n = b.len();
         let m = n / 3;
-        for v in [&mut self.gradient, &mut self.base, &mut self.target, &mut self.best, &mut self.row] {
+        for v in [&mut self.gradient, &mut self.target, &mut self.best, &mut self.row] {
             v.clear();
             v.resize(n, 0.0);
         }
+        self.unknowns.clear();
+        self.factor.clear();
         self.pressed.clear();
         self.friction.clear();
         self.friction.resize(m, Friction::None);
@@ -98,29 +128,47 @@ impl Cone {
             if reached < limits.residual || self.left < 0.0 {
                 break;
             }
-            self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps);
+            self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps, if round == 0 { 100.0 } else { 1.0 });
             // With discs that fit the normal forces.
             self.target.copy_from_slice(l);
-            for c in 0..m {
-                let (y, z) = onto_disc(l[3 * c + 1], l[3 * c + 2], mu[c] * l[3 * c]);
-                (self.target[3 * c + 1], self.target[3 * c + 2]) = (y, z);
+            let simple = self.judge(s, b, mu, &mut reached);
+            if reached < limits.residual {
+                break;
             }
-            let fitted = core::mem::take(&mut self.target);
-            self.find_gradient(s, b, &fitted);
-            let residual = self.residual(s, mu, &fitted);
-            if residual < reached {
-                reached = residual;
-                self.best.copy_from_slice(&fitted);
+            let mut slow = round >= SWING;
+            if self.following_discs(s, b, mu) && self.judge(s, b, mu, &mut reached) < simple {
+                slow = false;
+                l.copy_from_slice(&self.target);
+                for c in 0..m {
+                    self.pressed[c] = l[3 * c] > 0.0;
+                }
             }
-            self.target = fitted;
             for c in 0..m {
                 let fit = mu[c] * l[3 * c];
-                let slow = round >= SWING && self.disc[c] > 1e-9 * fit;
-                self.set_disc(c, if slow { 0.5 * (fit + self.disc[c]) } else { fit }, l);
+                let half = slow && self.disc[c] > 1e-9 * fit;
+                self.set_disc(c, if half { 0.5 * (fit + self.disc[c]) } else { fit }, l);
             }
+            self.find_gradient(s, b, l);
         }
         l.copy_from_slice(&self.best);
         reached
+    }
+
+    /// Makes `target` admissible; its residual. It is the best so far where that is less than `reached`.
+    fn judge(&mut self, s: &[f64], b: &[f64], mu: &[f64], reached: &mut f64) -> f64 {
+        let mut target = core::mem::take(&mut self.target);
+        for (f, mu) in target.chunks_exact_mut(3).zip(mu) {
+            f[0] = f[0].max(0.0);
+            (f[1], f[2]) = onto_disc(f[1], f[2], mu * f[0]);
+        }
+        self.find_gradient(s, b, &target);
+        let residual = self.residual(s, mu, &target);
+        if residual < *reached {
+            *reached = residual;
+            self.best.copy_from_slice(&target);
+        }
+        self.target = target;
+        residual
     }
 
     /// Gives a contact its disc and puts its friction force into it.
@@ -167,87 +215,121 @@ impl Cone {
         worst
     }
 
-    /// Minimizes over normal forces and friction forces in the discs as they are. Leaves the gradient at `l`.
-    fn fixed_discs(&mut self, s: &[f64], b: &[f64], l: &mut [f64], tolerance: f64, steps: u32) {
+    /// Minimizes over normal forces and friction forces in the discs as they are, from the gradient at `l`, and leaves it there.
+    fn fixed_discs(&mut self, s: &[f64], b: &[f64], l: &mut [f64], tolerance: f64, steps: u32, loose: f64) {
         let (n, m) = (b.len(), b.len() / 3);
-        let mut eager = true;
+        let (mut eager, mut part) = (true, 0.0);
+        self.find_pulls(false, tolerance);
         for step in 0..steps {
             eager = eager && step < EAGER;
-            if self.left < 0.0 || !self.solve_working_set(s, b) {
+            if self.left < 0.0 || !self.solve_working_set(s, l, if part < 1.0 { 10.0 * STALE } else { STALE }) {
                 break;
             }
-            let (part, stuck) = self.first_bound(l);
-            for (v, t) in l.iter_mut().zip(&self.target) {
-                *v = if part < 1.0 { *v + part * (t - *v) } else { *t };
-            }
+            let stuck;
+            (part, stuck) = self.first_bound(l, if eager { TOGETHER } else { 0.0 });
             // A contact that entered with others and would leave at once: from now on one at a time.
             eager = eager && !stuck;
-            let mut turned = false;
+            let mut turned = 0.0f64;
             for c in 0..m {
                 let (i, radius) = (3 * c, self.disc[c]);
-                let size = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2]).sqrt();
+                let (before, bound, near) = ([l[i], l[i + 1], l[i + 2]], self.bound(c, l), self.near_rim(c, l));
+                for a in i..i + 3 {
+                    l[a] = if part < 1.0 { l[a] + part * (self.target[a] - l[a]) } else { self.target[a] };
+                }
                 match self.friction[c] {
-                    Friction::Rim(y, z, turn) if size > 0.0 => {
-                        (l[i + 1], l[i + 2]) = (l[i + 1] * radius / size, l[i + 2] * radius / size);
-                        self.friction[c] = Friction::Rim(l[i + 1] / radius, l[i + 2] / radius, turn);
-                        let moved = ((l[i + 1] - radius * y).powi(2) + (l[i + 2] - radius * z).powi(2)).sqrt();
-                        turned |= tangential(s, n, i) * moved > tolerance;
+                    Friction::Rim(y, z, turn) => {
+                        let size = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2]).sqrt();
+                        if size > 0.0 {
+                            (l[i + 1], l[i + 2]) = (l[i + 1] * radius / size, l[i + 2] * radius / size);
+                            self.friction[c] = Friction::Rim(l[i + 1] / radius, l[i + 2] / radius, turn);
+                            let moved = ((l[i + 1] - radius * y).powi(2) + (l[i + 2] - radius * z).powi(2)).sqrt();
+                            turned = turned.max(tangential(s, n, i) * moved);
+                        }
                     }
-                    Friction::Inside if part < 1.0 && size >= radius * (1.0 - 1e-9) && size > 0.0 => {
-                        let (y, z) = (self.target[i + 1], self.target[i + 2]);
-                        if y * y + z * z > radius * radius {
-                            self.friction[c] = Friction::Rim(l[i + 1] / size, l[i + 2] / size, 0.0);
+                    Friction::Inside if bound.disc <= part || eager && near && bound.disc <= TOGETHER => {
+                        let [y, z] = [1, 2].map(|a| before[a] + bound.disc * (self.target[i + a] - before[a]));
+                        let size = (y * y + z * z).sqrt();
+                        if size > 0.0 {
+                            (l[i + 1], l[i + 2]) = (y * radius / size, z * radius / size);
+                            self.friction[c] = Friction::Rim(y / size, z / size, 0.0);
                         }
                     }
                     _ => {}
                 }
-                if self.pressed[c] && self.target[i] < 0.0 && l[i] <= 1e-12 * (l[i] - self.target[i]) {
+                if bound.normal <= part {
                     self.pressed[c] = false;
                     l[i] = 0.0;
                 }
             }
             self.find_gradient(s, b, l);
-            let optimal = part >= 1.0 && !turned;
-            let mut released = false;
-            for c in 0..m {
-                if let Friction::Rim(y, z, _) = self.friction[c] {
-                    let pull = -(self.gradient[3 * c + 1] * y + self.gradient[3 * c + 2] * z);
-                    if optimal && pull < -tolerance {
-                        self.friction[c] = Friction::Inside;
-                        released = true;
-                    } else {
-                        self.friction[c] = Friction::Rim(y, z, (pull / self.disc[c]).max(0.0));
-                    }
-                }
-            }
-            if optimal && !released && !self.enter(s, n, tolerance, eager) {
+            self.left -= (self.unknowns.len() * n) as f64;
+            let overlap = (0..m).filter(|c| !self.pressed[*c]).map(|c| -self.gradient[3 * c]).fold(0.0, f64::max);
+            // Where much is still to come the rims need not be exact.
+            let exact = tolerance * loose;
+            let optimal = part >= 1.0 && turned <= exact.max(0.03 * overlap);
+            let released = self.find_pulls(optimal, tolerance);
+            if optimal && !released && !self.enter(s, n, tolerance, eager) && turned <= exact {
                 break;
             }
         }
     }
 
-    /// How far `l` may go toward the target before a bound of the working set is met or a rim has turned far, and whether it may not move at all.
-    fn first_bound(&self, l: &[f64]) -> (f64, bool) {
+    fn near_rim(&self, c: usize, l: &[f64]) -> bool {
+        l[3 * c + 1].powi(2) + l[3 * c + 2].powi(2) > (0.98 * self.disc[c]).powi(2)
+    }
+
+    /// How hard each friction force on its rim is pulled outward, which holds it against turning. One that is pulled inward leaves its rim when `release`; before
+    /// it is held as if it were pulled outward, or it would turn far for nothing. Whether any left.
+    fn find_pulls(&mut self, release: bool, tolerance: f64) -> bool {
+        let mut released = false;
+        for (c, friction) in self.friction.iter_mut().enumerate() {
+            if let Friction::Rim(y, z, turn) = friction {
+                let pull = -(self.gradient[3 * c + 1] * *y + self.gradient[3 * c + 2] * *z);
+                *turn = pull.abs() / self.disc[c];
+                if release && pull < -tolerance {
+                    *friction = Friction::Inside;
+                    released = true;
+                }
+            }
+        }
+        released
+    }
+
+    /// The parts of the way from `l` to the target at which a contact meets its bounds.
+    fn bound(&self, c: usize, l: &[f64]) -> Bound {
+        let (i, radius) = (3 * c, self.disc[c]);
+        let (y, z) = (self.target[i + 1], self.target[i + 2]);
+        let mut bound = Bound { normal: f64::INFINITY, disc: f64::INFINITY };
+        if self.friction[c] == Friction::Inside && y * y + z * z > radius * radius * (1.0 + 1e-12) {
+            // |l + t d| = radius.
+            let (dy, dz) = (y - l[i + 1], z - l[i + 2]);
+            let (moved, half) = (dy * dy + dz * dz, l[i + 1] * dy + l[i + 2] * dz);
+            let inside = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2] - radius * radius).min(0.0);
+            bound.disc = (((half * half - moved * inside).max(0.0).sqrt() - half) / moved).max(0.0);
+        }
+        if self.pressed[c] && self.target[i] < 0.0 {
+            bound.normal = if l[i] > 0.0 { l[i] / (l[i] - self.target[i]) } else { 0.0 };
+        }
+        bound
+    }
+
+    /// How far `l` may go toward the target before a bound of the working set is met, all those within the first `together` of the way taken for
+    /// one, or a rim has turned far; and whether a contact may not move at all.
+    fn first_bound(&self, l: &[f64], together: f64) -> (f64, bool) {
         let (mut part, mut stuck) = (1.0f64, false);
         for c in 0..self.disc.len() {
-            let (i, radius) = (3 * c, self.disc[c]);
-            let (y, z) = (self.target[i + 1], self.target[i + 2]);
-            let (dy, dz) = (y - l[i + 1], z - l[i + 2]);
-            let moved = dy * dy + dz * dz;
-            match self.friction[c] {
-                Friction::Inside if y * y + z * z > radius * radius * (1.0 + 1e-12) => {
-                    // |l + t d| = radius.
-                    let half = l[i + 1] * dy + l[i + 2] * dz;
-                    let inside = (l[i + 1] * l[i + 1] + l[i + 2] * l[i + 2] - radius * radius).min(0.0);
-                    part = part.min(((half * half - moved * inside).max(0.0).sqrt() - half) / moved).max(0.0);
-                }
-                Friction::Rim(..) if moved > (TURN * radius).powi(2) => part = part.min(TURN * radius / moved.sqrt()),
-                _ => {}
+            let bound = self.bound(c, l);
+            stuck |= bound.normal == 0.0;
+            part = part.min(bound.normal);
+            if bound.disc > together || !self.near_rim(c, l) {
+                part = part.min(bound.disc);
             }
-            if self.pressed[c] && self.target[i] < 0.0 {
-                let way = if l[i] > 0.0 { l[i] / (l[i] - self.target[i]) } else { 0.0 };
-                stuck |= way == 0.0;
-                part = part.min(way);
+            if let Friction::Rim(..) = self.friction[c] {
+                let (i, radius) = (3 * c, self.disc[c]);
+                let moved = (self.target[i + 1] - l[i + 1]).powi(2) + (self.target[i + 2] - l[i + 2]).powi(2);
+                if moved > (TURN * radius).powi(2) {
+                    part = part.min(TURN * radius / moved.sqrt());
+                }
             }
         }
         (part, stuck)
@@ -275,70 +357,177 @@ impl Cone {
         entered > 0
     }
 
-    /// Minimizes over the working set without bounds; the minimum is left in `target`. False when its matrix is not positive definite.
-    fn solve_working_set(&mut self, s: &[f64], b: &[f64]) -> bool {
-        let n = b.len();
-        self.unknowns.clear();
-        self.base.fill(0.0);
-        for c in 0..n / 3 {
-            let i = 3 * c;
-            if self.pressed[c] {
-                self.unknowns.push((i, Kind::Component(0)));
+    /// Whether a factored unknown still is one of the working set, or nearly.
+    fn stands(&self, unknown: &Unknown, diagonal: f64, stale: f64) -> bool {
+        let c = unknown.contact / 3;
+        match (unknown.kind, self.friction[c]) {
+            (Kind::Component(0), _) => self.pressed[c],
+            (Kind::Component(_), friction) => friction == Friction::Inside,
+            (Kind::Turn(ty, tz), Friction::Rim(y, z, turn)) => {
+                (ty * y + tz * z).abs() <= stale && (turn - unknown.turn).abs() <= stale * (diagonal + unknown.turn)
             }
-            match self.friction[c] {
-                Friction::None => {}
-                Friction::Inside => self.unknowns.extend([(i, Kind::Component(1)), (i, Kind::Component(2))]),
-                Friction::Rim(y, z, _) => {
-                    self.unknowns.push((i, Kind::Turn(-z, y)));
-                    (self.base[i + 1], self.base[i + 2]) = (self.disc[c] * y, self.disc[c] * z);
-                }
+            (Kind::Turn(..), _) => false,
+        }
+    }
+
+    /// Makes the factored set the working set. False when its matrix is not positive definite.
+    fn factor_working_set(&mut self, s: &[f64], n: usize, stale: f64) -> bool {
+        let m = n / 3;
+        // What of each contact is factored: a bit for its normal force, one for its friction.
+        let mut have = core::mem::take(&mut self.have);
+        have.clear();
+        have.resize(m, 0u8);
+        for k in (0..self.unknowns.len()).rev() {
+            let unknown = self.unknowns[k];
+            let bit = if unknown.kind == Kind::Component(0) { 1 } else { 2 };
+            if self.stands(&unknown, tangential(s, n, unknown.contact), stale) {
+                have[unknown.contact / 3] |= bit;
+            } else {
+                self.left -= 0.5 * ((self.unknowns.len() - k) as f64).powi(2);
+                self.factor.remove(k);
+                self.unknowns.remove(k);
             }
         }
-        let base = core::mem::take(&mut self.base);
-        self.find_gradient(s, b, &base);
-        let k = self.unknowns.len();
-        self.left -= (k * k * k) as f64 / 6.0 + (k * n) as f64;
-        self.dense.clear();
-        self.dense.resize(k * k, 0.0);
+        let mut positive = true;
+        for c in 0..m {
+            let contact = 3 * c;
+            if self.pressed[c] && have[c] & 1 == 0 {
+                positive &= self.push(s, n, Unknown { contact, kind: Kind::Component(0), turn: 0.0 });
+            }
+            match self.friction[c] {
+                Friction::Inside if have[c] & 2 == 0 => {
+                    for a in [1, 2] {
+                        positive &= self.push(s, n, Unknown { contact, kind: Kind::Component(a), turn: 0.0 });
+                    }
+                }
+                Friction::Rim(y, z, turn) if have[c] & 2 == 0 => positive &= self.push(s, n, Unknown { contact, kind: Kind::Turn(-z, y), turn }),
+                _ => {}
+            }
+        }
+        self.have = have;
+        positive
+    }
+
+    fn push(&mut self, s: &[f64], n: usize, unknown: Unknown) -> bool {
+        let i = unknown.contact;
+        let row: &[f64] = match unknown.kind {
+            Kind::Component(a) => &s[(i + a) * n..(i + a + 1) * n],
+            Kind::Turn(y, z) => {
+                for (v, (r1, r2)) in self.row.iter_mut().zip(s[(i + 1) * n..(i + 2) * n].iter().zip(&s[(i + 2) * n..(i + 3) * n])) {
+                    *v = y * r1 + z * r2;
+                }
+                &self.row
+            }
+        };
+        self.left -= 0.5 * (self.unknowns.len() as f64).powi(2);
+        let pushed = self.factor.push(self.unknowns.iter().map(|u| u.of(row)).chain([unknown.of(row) + unknown.turn]));
+        if pushed {
+            self.unknowns.push(unknown);
+        }
+        pushed
+    }
+
+    /// Minimizes over the working set without bounds, from the gradient at `l`; the minimum is left in `target`. False when its matrix is not positive
+    /// definite.
+    fn solve_working_set(&mut self, s: &[f64], l: &[f64], stale: f64) -> bool {
+        if !self.factor_working_set(s, l.len(), stale) {
+            return false;
+        }
+        self.left -= (self.unknowns.len() as f64).powi(2);
         self.right.clear();
-        for p in 0..k {
-            let (i, kind) = self.unknowns[p];
-            let (row, right): (&[f64], f64) = match kind {
-                Kind::Component(a) => (&s[(i + a) * n..(i + a + 1) * n], self.gradient[i + a]),
+        // The right side is that of the rims as they are, also where the matrix is of what they were.
+        for k in 0..self.unknowns.len() {
+            let now = self.now(&self.unknowns[k]);
+            self.right.push(-now.of(&self.gradient));
+        }
+        self.factor.solve(&mut self.right);
+        self.target.copy_from_slice(l);
+        for k in 0..self.unknowns.len() {
+            let (now, x) = (self.now(&self.unknowns[k]), self.right[k]);
+            add(&now, x, &mut self.target);
+        }
+        true
+    }
+
+    /// The unknown with its rim's direction as it is now.
+    fn now(&self, unknown: &Unknown) -> Unknown {
+        match (unknown.kind, self.friction[unknown.contact / 3]) {
+            (Kind::Turn(..), Friction::Rim(y, z, turn)) => Unknown { kind: Kind::Turn(-z, y), turn, ..*unknown },
+            _ => *unknown,
+        }
+    }
+
+    /// Solves the working set with every disc of a contact on its rim following its normal force; the solution is left in `target`. False when it has
+    /// none.
+    fn following_discs(&mut self, s: &[f64], b: &[f64], mu: &[f64]) -> bool {
+        let n = b.len();
+        // A pressed contact's friction only.
+        let mut set = core::mem::take(&mut self.unknowns);
+        let factored = set.len();
+        for k in 0..factored {
+            let now = self.now(&set[k]);
+            if self.pressed[now.contact / 3] {
+                set.push(now);
+            }
+        }
+        let unknowns = &set[factored..];
+        let k = unknowns.len();
+        self.left -= (k * k * k) as f64 / 3.0;
+        self.dense.clear();
+        self.right.clear();
+        for u in unknowns {
+            let i = u.contact;
+            let row: &[f64] = match u.kind {
+                Kind::Component(a) => &s[(i + a) * n..(i + a + 1) * n],
                 Kind::Turn(y, z) => {
                     for (v, (r1, r2)) in self.row.iter_mut().zip(s[(i + 1) * n..(i + 2) * n].iter().zip(&s[(i + 2) * n..(i + 3) * n])) {
                         *v = y * r1 + z * r2;
                     }
-                    (&self.row, y * self.gradient[i + 1] + z * self.gradient[i + 2])
+                    &self.row
                 }
             };
-            self.right.push(-right);
-            for (d, (j, other)) in self.dense[p * k + p..(p + 1) * k].iter_mut().zip(&self.unknowns[p..]) {
-                *d = match other {
-                    Kind::Component(a) => row[j + a],
-                    Kind::Turn(y, z) => y * row[j + 1] + z * row[j + 2],
+            for v in unknowns {
+                let j = v.contact;
+                let drag = match (v.kind, self.friction[j / 3]) {
+                    (Kind::Component(0), Friction::Rim(y, z, _)) => mu[j / 3] * (y * row[j + 1] + z * row[j + 2]),
+                    _ => 0.0,
                 };
+                self.dense.push(v.of(row) + drag + if u == v { u.turn } else { 0.0 });
             }
-            if let (Kind::Turn(..), Friction::Rim(_, _, turn)) = (kind, self.friction[i / 3]) {
-                self.dense[p * k + p] += turn;
-            }
+            self.right.push(-u.of(b));
         }
-        let positive = factor_upper(&mut self.dense, k);
-        if positive {
-            solve_upper(&self.dense, &mut self.right);
-            self.target.copy_from_slice(&base);
-            for ((i, kind), x) in self.unknowns.iter().zip(&self.right) {
-                match kind {
-                    Kind::Component(a) => self.target[i + a] += x,
-                    Kind::Turn(y, z) => {
-                        self.target[i + 1] += y * x;
-                        self.target[i + 2] += z * x;
-                    }
+        let solved = solve_dense(&mut self.dense, &mut self.right);
+        if solved {
+            self.target.fill(0.0);
+            for (u, x) in unknowns.iter().zip(&self.right) {
+                add(u, *x, &mut self.target);
+                if let (Kind::Component(0), Friction::Rim(y, z, _)) = (u.kind, self.friction[u.contact / 3]) {
+                    self.target[u.contact + 1] += mu[u.contact / 3] * y * x;
+                    self.target[u.contact + 2] += mu[u.contact / 3] * z * x;
                 }
             }
         }
-        self.base = base;
-        positive
+        set.truncate(factored);
+        self.unknowns = set;
+        solved
+    }
+}
+
+/// The parts of a way at which a contact meets its bounds.
+#[derive(Debug, Clone, Copy)]
+struct Bound {
+    normal: f64,
+    disc: f64,
+}
+
+fn add(unknown: &Unknown, x: f64, v: &mut [f64]) {
+    let i = unknown.contact;
+    match unknown.kind {
+        Kind::Component(a) => v[i + a] += x,
+        Kind::Turn(y, z) => {
+            v[i + 1] += y * x;
+            v[i + 2] += z * x;
+        }
     }
 }
 
@@ -354,57 +543,38 @@ fn onto_disc(y: f64, z: f64, radius: f64) -> (f64, f64) {
     if size > radius { (y * radius / size, z * radius / size) } else { (y, z) }
 }
 
-/// Dot product in eight interleaved sums: a fixed order that vectorizes.
-#[inline]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (ca, cb) = (a.chunks_exact(8), b.chunks_exact(8));
-    let tail: f64 = ca.remainder().iter().zip(cb.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in ca.zip(cb) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7])) + tail
-}
-
-/// LDL^T of a symmetric matrix of which the upper triangle is given, row after row; leaves D on the diagonal and D L^T above it.
-fn factor_upper(a: &mut [f64], n: usize) -> bool {
+/// Gauss elimination with row pivoting: replaces `x` by the solution. False when the matrix is singular.
+fn solve_dense(a: &mut [f64], x: &mut [f64]) -> bool {
+    let n = x.len();
     for k in 0..n {
-        let d = a[k * n + k];
-        if !(d > 0.0 && d.is_finite()) {
+        let pivot = (k..n).max_by(|i, j| a[i * n + k].abs().total_cmp(&a[j * n + k].abs())).expect("k < n");
+        if pivot != k {
+            x.swap(pivot, k);
+            for c in k..n {
+                a.swap(pivot * n + c, k * n + c);
+            }
+        }
+        let inv = 1.0 / a[k * n + k];
+        if !inv.is_finite() {
             return false;
         }
-        let inv = 1.0 / d;
         let (top, bottom) = a.split_at_mut((k + 1) * n);
         let pivot = &top[k * n + k + 1..];
         for i in k + 1..n {
-            let f = pivot[i - k - 1] * inv;
+            let row = &mut bottom[(i - k - 1) * n + k..(i - k) * n];
+            let f = row[0] * inv;
             if f != 0.0 {
-                let row = &mut bottom[(i - k - 1) * n + i..(i - k) * n];
-                for (r, p) in row.iter_mut().zip(&pivot[i - k - 1..]) {
+                for (r, p) in row[1..].iter_mut().zip(pivot) {
                     *r -= f * p;
                 }
+                x[i] -= f * x[k];
             }
         }
     }
-    true
-}
-
-fn solve_upper(a: &[f64], x: &mut [f64]) {
-    let n = x.len();
-    for k in 0..n {
-        let f = x[k] / a[k * n + k];
-        x[k] = f;
-        let (_, rest) = x.split_at_mut(k + 1);
-        for (v, r) in rest.iter_mut().zip(&a[k * n + k + 1..(k + 1) * n]) {
-            *v -= f * r;
-        }
-    }
     for k in (0..n).rev() {
-        let s = dot(&a[k * n + k + 1..(k + 1) * n], &x[k + 1..]);
-        x[k] -= s / a[k * n + k];
+        x[k] = (x[k] - dot(&a[k * n + k + 1..(k + 1) * n], &x[k + 1..])) / a[k * n + k];
     }
+    true
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub(crate) mod cone;
 pub(crate) mod couple;
+pub(crate) mod ldl;
 pub(crate) mod pushed;
 pub(crate) mod shape;
 pub(crate) mod thread;

@@ -3,7 +3,8 @@
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, KnotType, recognize};
 
-/// The polyline through `n + 1` points at equal distances along `points`.
+/// The polyline through `n + 1` points at equal arcs along `points`. (Scenes cut lines into equal chords instead; the engine's tests have
+/// their own copy, see there.)
 pub fn evenly(points: &[DVec3], n: usize) -> Vec<DVec3> {
     let mut arc = vec![0.0];
     for w in points.windows(2) {
@@ -39,7 +40,7 @@ pub fn knot_free(points: &[DVec3]) -> KnotType {
 const SEED: u64 = 1;
 
 /// A loose open overhand knot of this length \[m\] in `n` equal elements. The polynomial trefoil (Shastri)
-/// `(t^3 - 3 t, t^4 - 4 t^2, t^5 / 5 - 2 t)` with its height halved takes 45 % of the thread, straight tails the rest.
+/// `(t^3 - 3 t, t^4 - 4 t^2, t^5 / 5 - 2 t)` with its height times 0.55 takes 45 % of the thread, straight tails the rest.
 pub fn overhand(total: f64, n: usize) -> Vec<DVec3> {
     const FINE: usize = 4000;
     const KNOT: f64 = 0.45;

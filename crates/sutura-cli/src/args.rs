@@ -128,10 +128,10 @@ pub enum ScenesAction {
 /// Say which knot a polyline or a recorded thread is tied in.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-FILE is a table of points in order (comma-separated x, y, z; any unit; a line of headings and lines that begin with # are passed
+FILE is a table of points in order (comma-separated x, y, z; any unit; a line of headings and lines that begin with # are passed \
 over), or the trajectory of a run.
 
-An open thread is no knot until its ends are joined. `--ends held` joins them far away along rays outward from the ends, as when two
+An open thread is no knot until its ends are joined. `--ends held` joins them far away along rays outward from the ends, as when two \
 instruments hold them; `--ends free` tries 24 random closures, trims the tails, and calls the knot unknown when under 90 % agree.
 
 Examples:
@@ -196,7 +196,7 @@ pub struct Presets {
 /// Measure the speed of this build on this machine.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied.
+A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied. \
 Times are CPU times of the solver on one core; the median of a frame is the number to compare. Build with --release.
 
 Examples:

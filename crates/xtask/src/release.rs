@@ -8,7 +8,7 @@ pub fn ready(tally: &mut Tally) {
     tally.count("nothing uncommitted", clean());
     let version = env!("CARGO_PKG_VERSION");
     tally.count(&format!("CHANGELOG.md has {version} and nothing unreleased"), changelog(&read("CHANGELOG.md"), version));
-    for file in ["LICENSE-MIT", "LICENSE-APACHE", "docs/images/square_knot.png"] {
+    for file in ["LICENSE-MIT", "LICENSE-APACHE", "NOTICE", "docs/images/square_knot.png"] {
         let there = root().join(file).is_file();
         tally.count(&format!("there is {file}"), if there { Ok(()) } else { Err("it is missing") });
     }

@@ -50,7 +50,8 @@ pub fn overhand(length: f64, n: usize) -> Vec<DVec3> {
     resample(&points, n)
 }
 
-/// `n + 1` points at equal arcs along a polyline.
+/// `n + 1` points at equal arcs along a polyline. The studies have the same (`evenly` and `overhand` in `crates/studies/src/curve.rs`): what
+/// both see is the engine, which inserts centerlines and makes none, and its tests do not build the studies' tables and pictures.
 pub fn resample(points: &[DVec3], n: usize) -> Vec<DVec3> {
     let mut arc = vec![0.0];
     for w in points.windows(2) {

@@ -90,7 +90,7 @@ pub(crate) const PARALLEL: f64 = 0.914;
 pub(crate) const RECOVER: f64 = 0.8;
 /// Residual of the contact solve, in radii.
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-3;
-/// Multiplications that a contact solve may spend at first.
+/// Multiplications that a contact solve may spend.
 pub(crate) const CONTACT_WORK: f64 = 3e6;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
 pub(crate) const CONTACT_LEFT: f64 = 0.06;

@@ -28,17 +28,14 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
     let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
     let h = interval.length / n;
     report.converged = true;
-    for k in 0..n as u32 {
-        // The end of the last substep is the end of the interval, whatever the rounding.
-        let t = interval.start + h * f64::from(k);
-        if !advance(model, state, scratch, interval, t, h, 0, report) {
-            break;
-        }
+    state.time = interval.start;
+    let whole = (0..n as u32).all(|k| advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report));
+    // Where nothing acceptable was found, what is driven stays with the rest.
+    let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
+    for (_, grip) in state.grips.iter_mut() {
+        grip.pose = grip.pose.interpolate(&grip.target, reached);
     }
     state.time = interval.start + interval.length;
-    for (_, grip) in state.grips.iter_mut() {
-        grip.pose = grip.target;
-    }
 }
 
 /// Accepted substeps of one length before twice the length is tried again.

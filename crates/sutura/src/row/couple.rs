@@ -103,14 +103,11 @@ pub(crate) struct Coupling {
     small: Vec<f64>,
     /// Residual of the last solution, in radii.
     left: f64,
-    /// Solutions in this substep that were not good enough.
-    short: u32,
 }
 
 /// Forgets the contacts of the last substep.
 pub(crate) fn begin(scratch: &mut Scratch) {
     scratch.rows.solver.entries.clear();
-    scratch.rows.solver.short = 0;
 }
 
 /// Sets the zone of each rod: from the first to the last block that the small problem may touch.
@@ -141,7 +138,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     if rows.solver.entries.is_empty() {
         return;
     }
-    let Coupling { entries, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, left, short } = &mut rows.solver;
+    let Coupling { entries, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, left } = &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -216,11 +213,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             }
         }
     }
-    // More effort where it did not suffice in the iterations before.
-    let limits =
-        Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK * f64::from(1 << (2 * (*short).min(2))) };
+    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK };
     *left = cone.solve(s, b, mu, force, &limits) / smallest;
-    *short += u32::from(*left > params::CONTACT_LEFT);
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
     for (k, entry) in entries.iter_mut().enumerate() {

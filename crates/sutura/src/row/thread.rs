@@ -300,7 +300,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let normal = now.apart.try_normalize().or_else(|| before.apart.try_normalize()).unwrap_or(DVec3::Z);
         let normal = if normal.dot(before.apart) < 0.0 { -normal } else { normal };
         let mut row = ThreadRow::new(model, start, a, b, now.s, now.t, normal);
-        row.start_gap = (normal.dot(row.apart(start)) - row.sum).min(d0 - row.sum);
+        // Only an overlap that was there is forgiven, not that the two came round each other.
+        row.start_gap = if d0 < row.sum { (normal.dot(row.apart(start)) - row.sum).min(d0 - row.sum) } else { 0.0 };
         fresh.push(row);
     }
     merge(fresh);

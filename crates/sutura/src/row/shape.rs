@@ -64,11 +64,12 @@ pub(crate) struct ShapeRow {
     /// Force on the thread at the last look (firm) or of the last solution.
     pub normal_force: f64,
     friction: DVec3,
-    mode: Mode,
+    /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
+    mode: Mode,
 }
 
-/// What the friction of a row does, with the direction of its force.
+/// What the friction of a firm row does, with the direction of its force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Mode {
     Sticks,

@@ -11,7 +11,7 @@
 //! surface, with its arm on the frame, but does not turn a thread about its own direction; the normal force acts at the centerline.
 //! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active set): one that slides and
 //! is pushed back against its friction has stopped. Going by the trial force alone it would slide the other way then, and to and fro,
-//! since the spring is 10^5 times stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
+//! since the spring is 10^4 times and more stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
 //! solved with, and the next one starts from those.
 //!
 //! A row that slides by more than a trace has the kinetic coefficient in the next substep. Within a substep there is one coefficient, or

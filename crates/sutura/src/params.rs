@@ -88,8 +88,13 @@ pub(crate) const PRUNE: f64 = 0.5;
 pub(crate) const PARALLEL: f64 = 0.914;
 /// Part of an old overlap that may remain after a substep.
 pub(crate) const RECOVER: f64 = 0.8;
-/// Residual of the contact solve, in radii.
-pub(crate) const CONTACT_TOLERANCE: f64 = 1e-3;
+/// Residual of the contact solve, in radii. A light contact with a shape lies some 1e-4 radii deep: what leaves more does not find its force.
+pub(crate) const CONTACT_TOLERANCE: f64 = 1e-5;
+/// What a contact force in a rod's matrix may be off, over the largest of a shape on the same rod.
+pub(crate) const OFF_BALANCE: f64 = 2e-3;
+/// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less evens out forces
+/// between contacts that together hold.
+pub(crate) const SLIP: f64 = 1e-3;
 /// Multiplications that a contact solve may spend.
 pub(crate) const CONTACT_WORK: f64 = 3e6;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.

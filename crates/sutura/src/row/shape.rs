@@ -9,8 +9,13 @@
 //! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
 //! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. It acts at the
 //! surface, with its arm on the frame, but does not turn a thread about its own direction; the normal force acts at the centerline.
-//! A firm row that slides enters with its secant stiffness, limit over trial length, in every tangential direction; once it slides along
-//! its thread in the same direction in two iterations with none along it (the tangent).
+//! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active set): one that slides and
+//! is pushed back against its friction has stopped. Going by the trial force alone it would slide the other way then, and to and fro,
+//! since the spring is 10^4 times and more stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
+//! solved with, and the next one starts from those.
+//!
+//! A row that slides by more than a trace has the kinetic coefficient in the next substep. Within a substep there is one coefficient, or
+//! evening out forces between contacts that together hold would set them off one after the other.
 //!
 //! [`couple`]: crate::row::couple
 
@@ -34,15 +39,12 @@ pub(crate) struct ShapeRow {
     /// Normal force over gap squared \[N/m^2\], and normal stiffness at the last look \[N/m\].
     hardness: f64,
     stiffness: f64,
-    /// Friction coefficients sticking and sliding.
-    mu: [f64; 2],
+    /// Friction coefficient: the kinetic one if it slid in the last substep.
+    mu: f64,
     /// Least normal force of a firm row \[N\].
     least: f64,
     /// In the rods' matrix, not in the small problem.
     firm: bool,
-    /// Whether it slid in the last substep, and at the last look.
-    slid_before: bool,
-    sliding: bool,
     /// Left out of the small problem, it was violated.
     wanted: bool,
     /// Friction force at the start of the substep, in the tangent plane then, and slip that was still to be undone.
@@ -62,16 +64,20 @@ pub(crate) struct ShapeRow {
     /// Force on the thread at the last look (firm) or of the last solution.
     pub normal_force: f64,
     friction: DVec3,
-    /// Direction of the friction force in the iteration before, when it slid.
-    slid: DVec3,
+    /// Normal force that limits the friction of a firm row, and what that does.
+    pressed: f64,
+    mode: Mode,
+}
+
+/// What the friction of a firm row does, with the direction of its force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Mode {
+    Sticks,
+    Slides(DVec3),
 }
 
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
-
-/// Part of the limit of friction by which a row that sticks has to go beyond it before it slides. Where many stick at their limit they
-/// would otherwise not settle.
-const CLING: f64 = 2e-3;
 
 impl ShapeRow {
     /// Its element, when it may enter the small problem.
@@ -155,10 +161,8 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 hardness: HARDNESS * rod.material.young_modulus,
                 stiffness: 0.0,
                 least: params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
-                mu: [friction.stick, friction.slide],
+                mu: if known.is_some_and(|c| c.sliding) { friction.slide } else { friction.stick },
                 firm: normal_force > params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
-                slid_before: known.is_some_and(|c| c.sliding),
-                sliding: known.is_some_and(|c| c.sliding),
                 wanted: false,
                 anchor: known.map_or(DVec3::ZERO, |c| across(c.friction)),
                 drift: known.map_or(DVec3::ZERO, |c| across(c.drift)),
@@ -170,7 +174,8 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 carried: normal_force,
                 normal_force,
                 friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
-                slid: DVec3::ZERO,
+                mode: known.filter(|c| c.sliding).and_then(|c| across(c.friction).try_normalize()).map_or(Mode::Sticks, Mode::Slides),
+                pressed: 0.0,
             });
         };
         add(0.0);
@@ -222,53 +227,67 @@ fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
     slip - n * n.dot(slip)
 }
 
-/// Forces of a firm row at the iterate, and their stiffness against moves of the surface point. In the first iteration the row is linearized
-/// where it carried its force: Newton starts where velocity leads, which may be just off the surface.
-fn forces(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DMat3 {
+/// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first iteration the row is
+/// linearized where it carried its force: Newton starts where velocity leads, which may be just off the surface.
+fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DVec3 {
     look(model, state, row);
     let n = row.normal;
     let depth = (-row.gap).max(0.0);
-    let touching = row.hardness * depth * depth;
-    let pressed = if first && row.carried > touching {
+    row.pressed = row.hardness * depth * depth;
+    if first && row.carried > row.pressed {
         let carried = (row.carried / row.hardness).sqrt();
+        row.pressed = row.carried;
         row.stiffness = 2.0 * row.hardness * carried;
         row.normal_force = row.carried + row.stiffness * (-row.gap - carried);
-        row.carried
     } else {
         row.stiffness = 2.0 * row.hardness * depth;
-        row.normal_force = touching;
-        touching
-    };
-    let k = row.stiffness;
-    let trial = row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * k;
-    let limit = row.mu[usize::from(row.slid_before)] * pressed;
-    let size = trial.length();
-    if size <= if row.sliding { limit } else { limit * (1.0 + CLING) } {
-        row.slid = DVec3::ZERO;
-        row.sliding = false;
-        row.friction = trial;
-        return DMat3::from_diagonal(DVec3::splat(k));
+        row.normal_force = row.pressed;
     }
-    row.sliding = true;
-    let limit = row.mu[1] * pressed;
-    let direction = trial / size;
-    row.friction = direction * limit;
-    let secant = (DMat3::IDENTITY - outer(n, n)) * (k * limit / size);
-    let steady = row.slid.dot(direction) > 0.95 && direction.dot(row.along).abs() > 0.95;
-    row.slid = direction;
-    outer(n, n) * k + if steady { secant - outer(direction, direction) * (k * limit / size) } else { secant }
+    row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * row.stiffness
 }
 
-/// Takes rows that change their state out of the rods' matrix.
+/// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has stopped.
+fn decide(row: &mut ShapeRow, trial: DVec3) {
+    let (size, limit) = (trial.length(), row.mu * row.pressed);
+    row.mode = match row.mode {
+        Mode::Sticks if size > limit => Mode::Slides(trial / size),
+        Mode::Slides(d) if size > limit && trial.dot(d) > 0.0 => Mode::Slides(trial / size),
+        _ => Mode::Sticks,
+    };
+}
+
+/// Friction force of a firm row at the iterate, and stiffness of all its forces against moves of the surface point.
+fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
+    let (n, k) = (row.normal, row.stiffness);
+    match row.mode {
+        Mode::Sticks => {
+            row.friction = trial;
+            DMat3::from_diagonal(DVec3::splat(k))
+        }
+        Mode::Slides(before) => {
+            let limit = row.mu * row.pressed;
+            let size = trial.length();
+            let forward = size > limit && trial.dot(before) > 0.0;
+            let direction = if forward { trial / size } else { (before - n * n.dot(before)).normalize_or_zero() };
+            row.friction = direction * limit;
+            let aside = if forward { k * limit / size } else { k };
+            outer(n, n) * k + (DMat3::IDENTITY - outer(n, n) - outer(direction, direction)) * aside
+        }
+    }
+}
+
+/// Decides which firm rows slide, and takes those whose law is far from their linearization out of the rods' matrix.
 pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
     let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
-        forces(model, state, &start, row, first);
+        let trial = press(model, state, &start, row, first);
         // Much deeper than its force says, its law is far from the parabola's tangent.
         if row.gap < -3.0 * (row.carried / row.hardness).sqrt() || row.normal_force <= 0.0 && !first {
             *row = ShapeRow { firm: false, ..before };
+        } else {
+            decide(row, trial);
         }
     }
 }
@@ -283,7 +302,8 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
             look(model, state, row);
             continue;
         }
-        let stiffness = forces(model, state, &start, row, first);
+        let trial = press(model, state, &start, row, first);
+        let stiffness = forces(row, trial);
         let e = row.element as usize;
         let arm = row.normal * -row.radius;
         let (a, b) = (1.0 - row.s, row.s);
@@ -334,7 +354,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
                 (j, DVec3::new(d.dot(n), d.dot(t1), d.dot(t2)))
             }),
             free: DVec3::new(gap - allowed, slip.dot(t1), slip.dot(t2)),
-            mu: row.mu[usize::from(row.slid_before)],
+            mu: row.mu,
             compliance: row.entered,
             radius: row.radius,
             force: DVec3::new(row.normal_force, row.friction.dot(t1), row.friction.dot(t2)),
@@ -351,19 +371,26 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
-    let largest = rows.shapes.iter().map(|r| r.normal_force).fold(0.0, f64::max);
     let mut settled = true;
-    for row in &mut rows.shapes {
-        let mut now = *row;
-        if row.firm {
-            forces(model, state, &start, &mut now, false);
-            let predicted = row.normal_force - row.stiffness * (now.gap - row.gap);
-            // A row that was to stick and would slide has kept what it holds from starting.
-            settled &= (now.normal_force - predicted.max(0.0)).abs() <= 0.002 * largest && (row.sliding || !now.sliding);
-        } else if row.normal_force <= 0.0 {
-            look(model, state, &mut now);
-            if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
-                (row.wanted, settled) = (true, false);
+    // Rod by rod: what a taut one bears says nothing about a light one.
+    for rows in rows.shapes.chunk_by_mut(|a, b| model.rod_of[a.element as usize] == model.rod_of[b.element as usize]) {
+        let largest = rows.iter().map(|r| r.normal_force).fold(0.0, f64::max);
+        for row in rows {
+            let mut now = *row;
+            if row.firm {
+                let trial = press(model, state, &start, &mut now, false);
+                decide(&mut now, trial);
+                forces(&mut now, trial);
+                // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the next substep.
+                let friction = if row.mode == Mode::Sticks { trial } else { row.friction };
+                let normal_force = (row.normal_force - row.stiffness * (now.gap - row.gap)).max(0.0);
+                let off = (now.normal_force - normal_force).abs().max((now.friction - friction).length());
+                settled &= off <= params::OFF_BALANCE * largest;
+            } else if row.normal_force <= 0.0 {
+                look(model, state, &mut now);
+                if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
+                    (row.wanted, settled) = (true, false);
+                }
             }
         }
     }
@@ -377,14 +404,20 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
     let mut contacts = core::mem::take(&mut state.shape_contacts);
     contacts.clear();
     for row in &mut rows.shapes {
-        let drift = if row.firm {
-            forces(model, state, &start, row, false);
-            DVec3::ZERO
+        // How far it slid, and slip that is still to be undone.
+        let (slid, drift) = if row.firm {
+            let trial = press(model, state, &start, row, false);
+            if row.mode != Mode::Sticks {
+                decide(row, trial);
+            }
+            forces(row, trial);
+            let beyond = trial.length() - row.friction.length();
+            (if beyond > 0.0 { beyond / row.stiffness } else { 0.0 }, DVec3::ZERO)
         } else {
             look(model, state, row);
-            row.sliding = row.friction.length() >= 0.9999 * row.mu[usize::from(row.slid_before)] * row.normal_force;
-            let left = if row.sliding { DVec3::ZERO } else { slip(state, &start, row) + (row.friction - row.anchor) * row.entered };
-            left.clamp_length_max(0.1 * row.radius)
+            let left = slip(state, &start, row) + (row.friction - row.anchor) * row.entered;
+            let at_limit = row.friction.length() >= 0.9999 * row.mu * row.normal_force;
+            if at_limit { (left.length(), DVec3::ZERO) } else { (0.0, left.clamp_length_max(0.1 * row.radius)) }
         };
         if row.normal_force > 0.0 {
             contacts.push(ShapeContact {
@@ -395,7 +428,7 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
                 normal_force: row.normal_force,
                 friction: row.friction,
                 drift,
-                sliding: row.sliding,
+                sliding: slid > params::SLIP * row.radius,
             });
         }
     }

@@ -156,6 +156,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
             if apart.length_squared() > room * room {
                 continue;
             }
+            let apart = upright(model, start, a, *s, upright(model, start, b, *t, apart, 1.0), -1.0);
             let known = nearest_known(old, a, b, *s, *t);
             let mut normal = apart.try_normalize().unwrap_or(DVec3::Z);
             if let Some(k) = known.filter(|k| (k.a as usize, k.b as usize) == (a, b) && k.normal.dot(normal) < 0.0) {
@@ -172,6 +173,20 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     }
     merge(&mut rows.threads);
     inherit(old, &mut rows.threads);
+}
+
+/// Direction between two pieces, `apart`, where one of them is touched at the place `s` of its element `e`; the other is `side` times that way.
+/// Where `s` is an inner joint and the other lies over the neighboring element, the direction does not lean: a row's plane is fixed over the
+/// substep, and one that leans toward what slides along the thread is a wall at half of the way to the joint.
+fn upright(model: &Model, start: &[DVec3], e: usize, s: f64, apart: DVec3, side: f64) -> DVec3 {
+    let (from, to) = match s {
+        0.0 if e > 0 && model.is_element(e - 1) => (e, e - 1),
+        1.0 if model.is_element(e + 1) => (e + 1, e + 2),
+        _ => return apart,
+    };
+    let neighbor = start[to] - start[from];
+    let over = side * apart.dot(neighbor) / neighbor.length_squared();
+    if (0.0..1.0).contains(&over) { apart - neighbor * (side * over) } else { apart }
 }
 
 /// The last contact on the same pair of elements that is nearest in place.
@@ -330,13 +345,10 @@ pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
     for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {
         let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
         let limit = row.mu[usize::from(row.sliding)] * row.force.x;
-        let sliding = friction.length() >= 0.9999 * limit;
-        let drift = if sliding {
-            DVec3::ZERO
-        } else {
-            let slip = row.slip(state, &start);
-            (row.drift + slip + (friction - row.anchor) * row.compliance).clamp_length_max(0.1 * row.radii[0])
-        };
+        let left = row.drift + row.slip(state, &start) + (friction - row.anchor) * row.compliance;
+        let at_limit = friction.length() >= 0.9999 * limit;
+        let sliding = at_limit && left.length() > params::SLIP * row.radii[0].min(row.radii[1]);
+        let drift = if at_limit { DVec3::ZERO } else { left.clamp_length_max(0.1 * row.radii[0]) };
         contacts.push(ThreadContact {
             a: row.a as u32,
             b: row.b as u32,

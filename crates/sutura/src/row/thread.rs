@@ -156,7 +156,9 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
             if apart.length_squared() > room * room {
                 continue;
             }
-            let apart = upright(model, start, a, *s, upright(model, start, b, *t, apart, 1.0), -1.0);
+            if leans(model, start, b, *t, apart) || leans(model, start, a, *s, -apart) {
+                continue;
+            }
             let known = nearest_known(old, a, b, *s, *t);
             let mut normal = apart.try_normalize().unwrap_or(DVec3::Z);
             if let Some(k) = known.filter(|k| (k.a as usize, k.b as usize) == (a, b) && k.normal.dot(normal) < 0.0) {
@@ -175,18 +177,15 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     inherit(old, &mut rows.threads);
 }
 
-/// Direction between two pieces, `apart`, where one of them is touched at the place `s` of its element `e`; the other is `side` times that way.
-/// Where `s` is an inner joint and the other lies over the neighboring element, the direction does not lean: a row's plane is fixed over the
-/// substep, and one that leans toward what slides along the thread is a wall at half of the way to the joint.
-fn upright(model: &Model, start: &[DVec3], e: usize, s: f64, apart: DVec3, side: f64) -> DVec3 {
-    let (from, to) = match s {
-        0.0 if e > 0 && model.is_element(e - 1) => (e, e - 1),
-        1.0 if model.is_element(e + 1) => (e + 1, e + 2),
-        _ => return apart,
+/// Whether what is touched at the place `s` of element `e`, `apart` from there, lies over the neighboring element, which has its own row. A row's
+/// plane is fixed over the substep: one that leans toward what slides along the thread is a wall at half of the way to the joint.
+fn leans(model: &Model, start: &[DVec3], e: usize, s: f64, apart: DVec3) -> bool {
+    let neighbor = match s {
+        0.0 if e > 0 && model.is_element(e - 1) => start[e - 1] - start[e],
+        1.0 if model.is_element(e + 1) => start[e + 2] - start[e + 1],
+        _ => return false,
     };
-    let neighbor = start[to] - start[from];
-    let over = side * apart.dot(neighbor) / neighbor.length_squared();
-    if (0.0..1.0).contains(&over) { apart - neighbor * (side * over) } else { apart }
+    (1e-6..1.0).contains(&(apart.dot(neighbor) / neighbor.length_squared()))
 }
 
 /// The last contact on the same pair of elements that is nearest in place.

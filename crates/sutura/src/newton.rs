@@ -99,6 +99,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
         apply(model, state, scratch, scale);
+        row::shape::predict(scratch, scale);
         let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
@@ -171,7 +172,7 @@ fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
         let tension = if model.inextensible[e] { 0.0 } else { scratch.tension[e] };
         force - scratch.shear[e].extend(tension)
     };
-    work(scratch) + work_of_excess(state, scratch, error)
+    work(scratch) + work_of_excess(state, scratch, error) - row::shape::work_unforeseen(scratch)
 }
 
 /// Assembles and factors. False when a pivot is not positive.

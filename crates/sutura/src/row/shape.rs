@@ -67,6 +67,9 @@ pub(crate) struct ShapeRow {
     /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
     mode: Mode,
+    /// Force of a firm row and its stiffness as last assembled, and the force that the step after it predicted.
+    tangent: DMat3,
+    expected: DVec3,
 }
 
 /// What the friction of a firm row does, with the direction of its force.
@@ -176,6 +179,8 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
                 mode: known.filter(|c| c.sliding).and_then(|c| across(c.friction).try_normalize()).map_or(Mode::Sticks, Mode::Slides),
                 pressed: 0.0,
+                tangent: DMat3::ZERO,
+                expected: DVec3::ZERO,
             });
         };
         add(0.0);
@@ -321,7 +326,32 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
         system.next[2 * e + 1] += kt.transpose() * b;
         system.diagonal[2 * e + 1] += turn.transpose() * kt;
         rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &turn);
+        row.tangent = stiffness;
     }
+}
+
+/// Move of a row's surface point against its shape along the last step.
+fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders) -> DVec3 {
+    let e = row.element as usize;
+    let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
+    let pushed = sliders.find(row.shape).map_or(DVec3::ZERO, |j| sliders.direction(j) * sliders.step(j));
+    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s + turned.cross(row.normal * -row.radius) - pushed
+}
+
+/// Notes the forces that a step of this length predicts for the firm rows.
+pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
+    let Scratch { rows, step, .. } = scratch;
+    let sliders = &rows.sliders;
+    for row in rows.shapes.iter_mut().filter(|r| r.firm) {
+        row.expected = row.normal * row.normal_force + row.friction - row.tangent * moved(row, step, sliders) * scale;
+    }
+}
+
+/// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
+pub(crate) fn work_unforeseen(scratch: &Scratch) -> f64 {
+    let Scratch { rows, step, .. } = scratch;
+    let on = |row: &ShapeRow| (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders));
+    rows.shapes.iter().filter(|r| r.firm).map(on).sum()
 }
 
 /// Adds the rows that may act to the small problem.

@@ -116,7 +116,11 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         (before, moved_before) = (out.turn, out.residual);
         let settled =
             trusted && out.turn * rate < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual * rate < NEAR);
-        if scale >= 1.0 && settled && row::couple::solved(scratch) && row::shape::settled(model, state, scratch) && !row::thread::extend(model, state, scratch)
+        if scale >= 1.0
+            && settled
+            && row::couple::solved(scratch)
+            && row::shape::settled(model, state, scratch, out.iterations)
+            && !row::thread::extend(model, state, scratch)
         {
             out.converged = true;
             break;

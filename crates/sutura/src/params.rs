@@ -92,6 +92,8 @@ pub(crate) const RECOVER: f64 = 0.8;
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-5;
 /// What a contact force in a rod's matrix may be off, over the largest of a shape on the same rod.
 pub(crate) const OFF_BALANCE: f64 = 2e-3;
+/// Newton iterations after which a contact may be off by more, if it moves by less than `SLIP`.
+pub(crate) const FRONT: u32 = 3;
 /// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less evens out forces
 /// between contacts that together hold.
 pub(crate) const SLIP: f64 = 1e-3;

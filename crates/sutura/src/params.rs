@@ -1,4 +1,4 @@
-//! Settings of a world and every tolerance of the step. Lengths that the solver compares with are multiples of the smallest
+//! Settings of a world and the tolerances that stages of the step share. Lengths that the solver compares with are multiples of the smallest
 //! thread radius; nothing here is an absolute length.
 
 use crate::error::{Error, check};
@@ -13,8 +13,8 @@ pub struct Settings {
     pub substep: f64,
     /// Newton iterations in a substep before it is given up and halved, >= 1. Default 12.
     pub newton_max: u32,
-    /// A substep has converged when the last Newton iteration turned no element by more than this \[rad\] (and moved no
-    /// particle by more than ten times as many radii). The error left is of the order of its square. Default 0.003.
+    /// A substep has converged when Newton's next iteration is expected to turn no element by more than this \[rad\], going by the last two. The
+    /// error left is of the order of its square. Default 0.003.
     pub tolerance: f64,
     /// Linear damping d_v in [0, 1): velocities lose this fraction in a second, whatever the step. Default 0.
     pub linear_damping: f64,

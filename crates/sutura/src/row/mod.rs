@@ -1,4 +1,4 @@
-//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`], local).
+//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`]: firm in the rods' matrix, light in the small problem).
 
 pub(crate) mod cone;
 pub(crate) mod couple;

@@ -2,9 +2,9 @@
 //! fiftieth of the diameter, kept in reserve for the chords between particles), with Coulomb friction. It stiffens as Hertz contact does; k is
 //! such that a force of `E r^2 / 1000` leaves a gap of -r / 100.
 //!
-//! A row that bore a firm load and keeps its state is a spring in the rods' own matrix: cost is linear in the number of such rows. All others
-//! (light ones, those that touch, lift off, begin to slide or to stick) enter the small contact problem ([`couple`]), which decides all of
-//! them at once; Newton alone would switch them on and off from one iteration to the next.
+//! A row that bore a firm load is a spring in the rods' own matrix: cost is linear in the number of such rows. All others (light ones, those
+//! that touch, lift off or lie much deeper than their force says) enter the small contact problem ([`couple`]), which decides all of them
+//! at once; Newton alone would switch them on and off from one iteration to the next.
 //!
 //! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
 //! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. It acts at the

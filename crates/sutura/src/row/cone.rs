@@ -32,12 +32,15 @@ pub(crate) struct Limits {
 const TURN: f64 = 0.7;
 /// Rounds after which the radii move halfway only: where friction and pressure feed each other they may swing.
 const SWING: u32 = 3;
-/// Steps in which several contacts may enter and several bounds be met at once.
+/// Steps in which several contacts may enter and several rims be met at once.
 const EAGER: u32 = 30;
-/// Part of a step up to which all bounds on the way count as met at once.
+/// Part of a step in which all friction forces that are near their rims meet them at once.
 const TOGETHER: f64 = 0.1;
 /// Turn of a rim \[rad\], and change of its stiffness over what the diagonal was, beyond which its row is factored again.
 const STALE: f64 = 0.01;
+
+/// How much less exact the rims are in the first round: its radii are those of the last forces, and Newton on the radii turns the rims too.
+const FIRST: f64 = 100.0;
 
 /// What a friction force may do.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,6 +77,20 @@ impl Unknown {
             Kind::Turn(y, z) => y * v[self.contact + 1] + z * v[self.contact + 2],
         }
     }
+
+    /// Its row of `s`, which has rows of `n`; that of a turn is put together in `work`.
+    fn row<'a>(&self, s: &'a [f64], n: usize, work: &'a mut [f64]) -> &'a [f64] {
+        let component = |a: usize| &s[(self.contact + a) * n..(self.contact + a + 1) * n];
+        match self.kind {
+            Kind::Component(a) => component(a),
+            Kind::Turn(y, z) => {
+                for (v, (r1, r2)) in work.iter_mut().zip(component(1).iter().zip(component(2))) {
+                    *v = y * r1 + z * r2;
+                }
+                work
+            }
+        }
+    }
 }
 
 /// Memory of the solver.
@@ -93,6 +110,7 @@ pub(crate) struct Cone {
     row: Vec<f64>,
     dense: Vec<f64>,
     waiting: Vec<(f64, usize)>,
+    /// What of each contact is factored.
     have: Vec<u8>,
     /// Multiplications that may still be spent.
     left: f64,
@@ -128,7 +146,7 @@ impl Cone {
             if reached < limits.residual || self.left < 0.0 {
                 break;
             }
-            self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps, if round == 0 { 100.0 } else { 1.0 });
+            self.fixed_discs(s, b, l, 0.3 * limits.residual, limits.steps, if round == 0 { FIRST } else { 1.0 });
             // With discs that fit the normal forces.
             self.target.copy_from_slice(l);
             let simple = self.judge(s, b, mu, &mut reached);
@@ -215,7 +233,8 @@ impl Cone {
         worst
     }
 
-    /// Minimizes over normal forces and friction forces in the discs as they are, from the gradient at `l`, and leaves it there.
+    /// Minimizes over normal forces and friction forces in the discs as they are, from the gradient at `l`, and leaves it there. Rims count as at rest when
+    /// they turn by no more than `loose` times the tolerance.
     fn fixed_discs(&mut self, s: &[f64], b: &[f64], l: &mut [f64], tolerance: f64, steps: u32, loose: f64) {
         let (n, m) = (b.len(), b.len() / 3);
         let (mut eager, mut part) = (true, 0.0);
@@ -274,6 +293,7 @@ impl Cone {
         }
     }
 
+    /// Whether a friction force is within a fiftieth of its rim.
     fn near_rim(&self, c: usize, l: &[f64]) -> bool {
         l[3 * c + 1].powi(2) + l[3 * c + 2].powi(2) > (0.98 * self.disc[c]).powi(2)
     }
@@ -313,8 +333,8 @@ impl Cone {
         bound
     }
 
-    /// How far `l` may go toward the target before a bound of the working set is met, all those within the first `together` of the way taken for
-    /// one, or a rim has turned far; and whether a contact may not move at all.
+    /// How far `l` may go toward the target before a bound of the working set is met or a rim has turned far; rims that are near already and met
+    /// within the first part `together` of the way do not count. And whether a contact may not move at all.
     fn first_bound(&self, l: &[f64], together: f64) -> (f64, bool) {
         let (mut part, mut stuck) = (1.0f64, false);
         for c in 0..self.disc.len() {
@@ -409,16 +429,7 @@ impl Cone {
     }
 
     fn push(&mut self, s: &[f64], n: usize, unknown: Unknown) -> bool {
-        let i = unknown.contact;
-        let row: &[f64] = match unknown.kind {
-            Kind::Component(a) => &s[(i + a) * n..(i + a + 1) * n],
-            Kind::Turn(y, z) => {
-                for (v, (r1, r2)) in self.row.iter_mut().zip(s[(i + 1) * n..(i + 2) * n].iter().zip(&s[(i + 2) * n..(i + 3) * n])) {
-                    *v = y * r1 + z * r2;
-                }
-                &self.row
-            }
-        };
+        let row = unknown.row(s, n, &mut self.row);
         self.left -= 0.5 * (self.unknowns.len() as f64).powi(2);
         let pushed = self.factor.push(self.unknowns.iter().map(|u| u.of(row)).chain([unknown.of(row) + unknown.turn]));
         if pushed {
@@ -476,16 +487,7 @@ impl Cone {
         self.dense.clear();
         self.right.clear();
         for u in unknowns {
-            let i = u.contact;
-            let row: &[f64] = match u.kind {
-                Kind::Component(a) => &s[(i + a) * n..(i + a + 1) * n],
-                Kind::Turn(y, z) => {
-                    for (v, (r1, r2)) in self.row.iter_mut().zip(s[(i + 1) * n..(i + 2) * n].iter().zip(&s[(i + 2) * n..(i + 3) * n])) {
-                        *v = y * r1 + z * r2;
-                    }
-                    &self.row
-                }
-            };
+            let row = u.row(s, n, &mut self.row);
             for v in unknowns {
                 let j = v.contact;
                 let drag = match (v.kind, self.friction[j / 3]) {

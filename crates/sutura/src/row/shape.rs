@@ -67,7 +67,7 @@ pub(crate) struct ShapeRow {
     /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
     mode: Mode,
-    /// Force of a firm row and its stiffness as last assembled, and the force that the step after it predicted.
+    /// Stiffness of a firm row as last assembled, and the force that the step after it predicted.
     tangent: DMat3,
     expected: DVec3,
 }

@@ -86,6 +86,8 @@ pub(crate) const MARGIN: f64 = 0.3;
 pub(crate) const PRUNE: f64 = 0.5;
 /// Squared cosine beyond which two elements count as parallel (17 degrees).
 pub(crate) const PARALLEL: f64 = 0.914;
+/// How much farther apart than their closest places two pieces may be where they are still taken to touch, in radii.
+pub(crate) const SAME_PLACE: f64 = 1e-3;
 /// Part of an old overlap that may remain after a substep.
 pub(crate) const RECOVER: f64 = 0.8;
 /// Residual of the contact solve, in radii. A light contact with a shape lies some 1e-4 radii deep: what leaves more does not find its force.

@@ -132,10 +132,11 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
         if c.apart.length_squared() > room * room {
             continue;
         }
+        let kept = keep_place(old, start, a, b, &c, r);
         // Near-parallel pieces touch along a stretch: a row at each end of their overlap as well.
         let (u, v) = (start[a + 1] - start[a], start[b + 1] - start[b]);
         let cosine = u.dot(v) / (u.length() * v.length());
-        let mut places = [(c.s, c.t); 5];
+        let mut places = [kept; 5];
         let mut count = 1;
         if cosine * cosine > params::PARALLEL {
             for (s, t) in [(Some(0.0), None), (Some(1.0), None), (None, Some(0.0)), (None, Some(1.0))] {
@@ -160,7 +161,8 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 continue;
             }
             let known = nearest_known(old, a, b, *s, *t);
-            let mut normal = apart.try_normalize().unwrap_or(DVec3::Z);
+            let across = if (*s, *t) == kept { c.apart } else { apart };
+            let mut normal = across.try_normalize().unwrap_or(DVec3::Z);
             if let Some(k) = known.filter(|k| (k.a as usize, k.b as usize) == (a, b) && k.normal.dot(normal) < 0.0) {
                 // It was on the other side: it has been pushed through and goes back.
                 normal = if apart.length() < 0.5 * row.sum { -normal } else { normal };
@@ -175,6 +177,18 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     }
     merge(&mut rows.threads);
     inherit(old, &mut rows.threads);
+}
+
+/// Where two pieces are taken to touch: where they last did, as long as that is about as near as their closest places `c`. (Within both pieces the
+/// direction is the same.) The closest places of pieces that are nearly parallel run along them with the least tilt. A row that follows moves the force
+/// with it, which tilts them back, to and fro from substep to substep.
+fn keep_place(old: &[ThreadContact], start: &[DVec3], a: usize, b: usize, c: &segment::Closest, radius: f64) -> (f64, f64) {
+    let inside = |x: f64| x > 0.0 && x < 1.0;
+    let Some(k) = nearest_known(old, a, b, c.s, c.t).filter(|_| inside(c.s) && inside(c.t)) else { return (c.s, c.t) };
+    let apart = start[a].lerp(start[a + 1], k.s) - start[b].lerp(start[b + 1], k.t);
+    let (farther, allowed) = (apart.length() - c.apart.length(), params::SAME_PLACE * radius);
+    let part = if farther <= allowed { 1.0 } else { (allowed / farther).sqrt() };
+    (c.s + (k.s - c.s) * part, c.t + (k.t - c.t) * part)
 }
 
 /// Whether what is touched at the place `s` of element `e`, `apart` from there, lies over the neighboring element, which has its own row. A row's

@@ -54,7 +54,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
     row::thread::begin(model, state, scratch);
-    row::shape::begin(model, state, scratch);
+    row::shape::begin(model, state, scratch, h);
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
     let verdict = if !outcome.finite {

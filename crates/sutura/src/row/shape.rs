@@ -21,6 +21,7 @@
 
 use crate::math::{Pose, log, outer, skew};
 use crate::model::Model;
+use crate::model::shape::ShapeMotion;
 use crate::params;
 use crate::row::Start;
 use crate::row::couple::{Endpoint, Entry, Source};
@@ -57,8 +58,9 @@ pub(crate) struct ShapeRow {
     /// Outward direction of the surface and gap at the last look.
     normal: DVec3,
     gap: f64,
-    /// Gap at the start.
+    /// Gap at the start, and where the velocity of the thread and the shape's drive would lead.
     start_gap: f64,
+    next_gap: f64,
     /// Normal force at the start.
     carried: f64,
     /// Force on the thread at the last look (firm) or of the last solution.
@@ -109,7 +111,7 @@ impl ShapeRow {
 }
 
 /// Collects the rows of the substep.
-pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
+pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
     rows.shapes.clear();
     rows.sliders.begin(model);
@@ -120,6 +122,10 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
         let rod = model.rods.at(model.rod_of[e]).expect("element of a living rod");
         let friction = model.friction_between(rod.surface, shape.surface);
         let pose = &state.shape_pose[k];
+        let pushed = match shape.motion {
+            ShapeMotion::Pushed { direction, force, speed_limit } if force > 0.0 => direction * (speed_limit * h),
+            _ => DVec3::ZERO,
+        };
         let reach = rod.radius * (1.0 + params::REACH);
         let x = &state.position;
         let far = |i: usize| {
@@ -174,6 +180,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
                 normal,
                 gap,
                 start_gap: gap,
+                next_gap: gap + now.value - before.value - normal.dot(pushed),
                 carried: normal_force,
                 normal_force,
                 friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
@@ -200,12 +207,22 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     merge(&mut rows.shapes);
 }
 
-/// Leaves one of rows that say the same of two shapes that lie in one another, such as the halves of a post: the one that carried force.
+/// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that is nearer now and next, or
+/// where they are alike the one that carried force. Both stay where one overtakes the other.
 fn merge(rows: &mut Vec<ShapeRow>) {
     rows.sort_unstable_by(|a, b| a.element.cmp(&b.element).then(a.s.total_cmp(&b.s)).then(b.carried.total_cmp(&a.carried)).then(a.shape.cmp(&b.shape)));
     rows.dedup_by(|b, a| {
         let place = a.element == b.element && (a.s - b.s).abs() < 1e-3;
-        place && (a.start_gap - b.start_gap).abs() < 1e-3 * a.radius && a.normal.dot(b.normal) > 0.9999
+        if !place || a.normal.dot(b.normal) < 0.99 {
+            return false;
+        }
+        let alike = 1e-3 * a.radius;
+        let farther = [b.start_gap - a.start_gap, b.next_gap - a.next_gap];
+        let (first, second) = (farther.iter().all(|f| *f > -alike), farther.iter().all(|f| *f < alike));
+        if second && !first {
+            core::mem::swap(a, b);
+        }
+        first || second
     });
 }
 

@@ -4,7 +4,7 @@ pub(crate) mod segment;
 mod shape;
 mod tree;
 
-pub(crate) use shape::Collider;
+pub(crate) use shape::{Collider, Distance};
 
 use crate::model::Model;
 use crate::params;
@@ -159,23 +159,29 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
             return Err("threads would pass through each other");
         }
     }
+    // Neighboring elements share a particle.
+    let mut last = None;
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
         let r = radius[e];
-        let side = |p: DVec3, pose| shape.collider.distance(pose, p, None);
         for (i, s) in [(e, 0.0), (e, 0.5), (e + 1, 1.0)] {
+            if s == 0.0 && last == Some((*slot, e)) {
+                continue;
+            }
             let at = |x: &[DVec3]| if s == 0.5 { (x[e] + x[e + 1]) * 0.5 } else { x[i] };
-            let before = side(at(start), &start_shape_pose[k]);
-            let now = shape.collider.distance(&state.shape_pose[k], at(x), Some(before.normal));
+            let before = || shape.collider.distance(&start_shape_pose[k], at(start), None);
+            let side = shape.collider.has_sides().then(|| before().normal);
+            let now = shape.collider.distance(&state.shape_pose[k], at(x), side);
             let gap = (now.value - r) / (2.0 * r);
             clearance.shape = Some(clearance.shape.map_or(gap, |c| c.min(gap)));
-            if gap < -params::OVERLAP && now.value < before.value - 2.0 * r * params::OVERLAP_DRIFT {
+            if gap < -params::OVERLAP && now.value < before().value - 2.0 * r * params::OVERLAP_DRIFT {
                 return Err("a thread overlaps a shape");
             }
             // A thin shape can be jumped over: look along the way.
             let way = (at(x) - at(start)).length();
             if way > r {
+                let before = before();
                 let steps = (2.0 * way / r).ceil().min(200.0);
                 for j in 1..steps as u32 {
                     let u = f64::from(j) / steps;
@@ -187,6 +193,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
                 }
             }
         }
+        last = Some((*slot, e + 1));
     }
     Ok(clearance)
 }

@@ -70,9 +70,25 @@ impl Collider {
         Distance { value: sign * length, normal }
     }
 
-    /// Place in [0, 1] on the segment where its distance is least. Distance to a convex set is convex along a segment, so a golden-section
-    /// search finds it; for a surface it is a local minimum near the better end.
-    pub fn nearest_on_segment(&self, pose: &Pose, a: DVec3, b: DVec3) -> f64 {
+    /// Whether distances need to know the side that they are taken from.
+    pub fn has_sides(&self) -> bool {
+        matches!(self, Collider::Surface(_))
+    }
+
+    /// Place in [0, 1] on the segment where its distance is least, where that is less than `below`. Distance to a convex set is convex along a
+    /// segment, so tangents bound it and a golden-section search finds it; for a surface it is a local minimum near the better end.
+    pub fn nearest_on_segment(&self, pose: &Pose, a: DVec3, b: DVec3, below: f64) -> Option<f64> {
+        let along = b - a;
+        let with_slope = |s: f64| {
+            let d = self.distance(pose, a.lerp(b, s), None);
+            (d.value, d.normal.dot(along))
+        };
+        if !self.has_sides() {
+            let (first, middle, last) = (with_slope(0.0), with_slope(0.5), with_slope(1.0));
+            if least_by_tangents(first, middle, 0.5).min(least_by_tangents(middle, last, 0.5)) >= below {
+                return None;
+            }
+        }
         let at = |s: f64| self.distance(pose, a.lerp(b, s), None).value;
         let golden = 0.381_966_011_250_105;
         let (mut lo, mut hi) = (0.0, 1.0);
@@ -91,7 +107,8 @@ impl Collider {
                 d2 = at(s2);
             }
         }
-        0.5 * (lo + hi)
+        let s = 0.5 * (lo + hi);
+        (at(s) < below).then_some(s)
     }
 
     /// World box that holds the shape.
@@ -115,6 +132,17 @@ impl Collider {
     }
 }
 
+/// The least that a convex function can be on an interval, by its values and slopes at the two ends.
+fn least_by_tangents((f0, g0): (f64, f64), (f1, g1): (f64, f64), length: f64) -> f64 {
+    if g0 >= 0.0 {
+        f0
+    } else if g1 <= 0.0 {
+        f1
+    } else {
+        f0 + g0 * ((f1 - f0 - g1 * length) / (g0 - g1)).clamp(0.0, length)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,9 +162,13 @@ mod tests {
     #[test]
     fn nearest_place_on_a_chord() {
         let c = Collider::new(&Geometry::Cylinder { radius: 5e-3, half_length: 0.02 }).unwrap();
-        let s = c.nearest_on_segment(&Pose::IDENTITY, DVec3::new(-3e-4, 5.1e-3, 0.0), DVec3::new(1e-4, 5.1e-3, 0.0));
+        let (a, b) = (DVec3::new(-3e-4, 5.1e-3, 0.0), DVec3::new(1e-4, 5.1e-3, 0.0));
+        let s = c.nearest_on_segment(&Pose::IDENTITY, a, b, 1.0001e-4).unwrap();
         // Fourteen golden sections leave 1e-3 of the segment.
         assert!((s - 0.75).abs() < 2e-3, "{s}");
+        // The chord comes as near as 1e-4; the tangents at its ends and middle know that it cannot come nearer than 0.97e-4.
+        assert_eq!(c.nearest_on_segment(&Pose::IDENTITY, a, b, 0.9999e-4), None);
+        assert!(least_by_tangents((1.0, -2.0), (1.0, 2.0), 0.5) == 0.5);
     }
 
     #[test]

@@ -19,6 +19,7 @@
 //!
 //! [`couple`]: crate::row::couple
 
+use crate::collide::Distance;
 use crate::math::{Pose, log, outer, skew};
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
@@ -116,6 +117,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
     rows.shapes.clear();
     rows.sliders.begin(model);
     let old = &state.shape_contacts;
+    let mut last = None;
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
@@ -128,20 +130,21 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
         };
         let reach = rod.radius * (1.0 + params::REACH);
         let x = &state.position;
-        let far = |i: usize| {
+        let look = |i: usize| {
             let before = shape.collider.distance(&start_shape_pose[k], start[i], None);
-            let now = shape.collider.distance(pose, x[i], Some(before.normal));
-            (before.value.min(now.value), before)
+            (before, shape.collider.distance(pose, x[i], Some(before.normal)))
         };
-        let (d0, _) = far(e);
-        let (d1, _) = far(e + 1);
+        // Neighboring elements share a particle.
+        let first = last.take().filter(|(at, _)| *at == (*slot, e)).map_or_else(|| look(e), |(_, seen)| seen);
+        let second = look(e + 1);
+        last = Some(((*slot, e + 1), second));
+        let nearer = |(before, now): (Distance, Distance)| before.value.min(now.value);
+        let (d0, d1) = (nearer(first), nearer(second));
         let length = (x[e + 1] - x[e]).length();
         if d0.min(d1) > reach + length {
             continue;
         }
-        let mut add = |s: f64| {
-            let p0 = start[e].lerp(start[e + 1], s);
-            let before = shape.collider.distance(&start_shape_pose[k], p0, None);
+        let mut add = |s: f64, before: Distance, now: Distance| {
             // Old contacts are sorted; those of this element on this shape are a few entries.
             let from = old.partition_point(|c| (c.shape, c.element) < (*slot, e as u32));
             let known = old[from..]
@@ -151,14 +154,12 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
                 .min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()))
                 // The half of a post that it touches now may be the other one.
                 .or_else(|| old.iter().find(|c| c.element == e as u32 && c.s == s && c.shape != *slot && c.normal.dot(before.normal) > 0.9999));
-            let normal = match known {
-                Some(c) if c.normal.dot(before.normal) < 0.0 => -before.normal,
-                _ => before.normal,
-            };
-            let now = shape.collider.distance(pose, x[e].lerp(x[e + 1], s), Some(normal));
             if now.value.min(before.value) > reach {
                 return;
             }
+            // A surface is left on the side where it was touched.
+            let side = if known.is_some_and(|c| c.normal.dot(before.normal) < 0.0) { -1.0 } else { 1.0 };
+            let normal = before.normal * side;
             let across = |v: DVec3| v - normal * normal.dot(v);
             let gap = before.value - rod.radius * (1.0 + 2.0 * params::KEEP);
             let normal_force = known.map_or(0.0, |c| c.normal_force);
@@ -180,7 +181,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
                 normal,
                 gap,
                 start_gap: gap,
-                next_gap: gap + now.value - before.value - normal.dot(pushed),
+                next_gap: gap + side * now.value - before.value - normal.dot(pushed),
                 carried: normal_force,
                 normal_force,
                 friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
@@ -190,18 +191,16 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
                 expected: DVec3::ZERO,
             });
         };
-        add(0.0);
-        let s = shape.collider.nearest_on_segment(pose, x[e], x[e + 1]);
-        if s > 0.02 && s < 0.98 {
-            let mid = shape.collider.distance(pose, x[e].lerp(x[e + 1], s), None).value;
-            // A row of its own only where the surface bulges toward the middle by more than may overlap. On a flatter one a chord would
-            // rock about it: the closest place runs along the element by (radius of the surface) x (tilt).
-            if mid < d0.min(d1) - 0.08 * rod.radius {
-                add(s);
-            }
+        add(0.0, first.0, first.1);
+        // A row of its own only where the surface bulges toward the middle by more than may overlap. On a flatter one a chord would
+        // rock about it: the closest place runs along the element by (radius of the surface) x (tilt).
+        let below = d0.min(d1) - 0.08 * rod.radius;
+        if let Some(s) = shape.collider.nearest_on_segment(pose, x[e], x[e + 1], below).filter(|s| *s > 0.02 && *s < 0.98) {
+            let before = shape.collider.distance(&start_shape_pose[k], start[e].lerp(start[e + 1], s), None);
+            add(s, before, shape.collider.distance(pose, x[e].lerp(x[e + 1], s), Some(before.normal)));
         }
         if !model.is_element(e + 1) {
-            add(1.0);
+            add(1.0, second.0, second.1);
         }
     }
     merge(&mut rows.shapes);

@@ -5,8 +5,7 @@ use crate::tally::{Tally, cargo, root};
 use std::time::Duration;
 
 /// Scenes that the whole check leaves out, and why. `cargo xtask scenes` runs them all.
-const LEFT_OUT: &[(&str, &str)] =
-    &[("surgeon", "takes minutes: its loose double throw halves most substeps"), ("twine", "takes minutes: hundreds of near contacts in one small problem")];
+const LEFT_OUT: &[(&str, &str)] = &[];
 
 /// The longest that a scene may take \[s\]: many times what the slowest takes on a slow machine; a scene that hangs is stopped.
 const LONGEST: Duration = Duration::from_secs(300);

@@ -71,8 +71,16 @@ pub(crate) const FIRM: f64 = 1e-8;
 pub(crate) const REACH: f64 = 1.5;
 /// Overlap, in sums of radii, beyond which a substep that brought two things nearer is rejected. The bar of the sample scenes is 0.05.
 pub(crate) const OVERLAP: f64 = 0.04;
-/// Approach within a substep that does not count as approach, in sums of radii: rounding of the contact solve.
-pub(crate) const OVERLAP_DRIFT: f64 = 2e-4;
+/// Overlap that no approach may go beyond.
+const DEEPEST: f64 = 0.05;
+
+/// Whether a motion from one clearance to another, both in sums of radii, is one that overlaps too much. What approaches by next to nothing (the
+/// contact solve leaves that much) may go on up to [`DEEPEST`]: many short substeps would add up.
+pub(crate) fn overlaps(before: f64, now: f64) -> bool {
+    let room = ((DEEPEST + now) / (DEEPEST - OVERLAP)).clamp(0.0, 1.0);
+    now < -OVERLAP && now < before - (1e-6 + 2e-4 * room)
+}
+
 /// Distance of centerlines, in sums of radii, that no motion may go below on its way.
 pub(crate) const PASS: f64 = 0.3;
 

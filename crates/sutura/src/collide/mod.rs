@@ -152,7 +152,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
             continue;
         }
         let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]).apart.length();
-        if gap < -params::OVERLAP && now < before - params::OVERLAP_DRIFT * sum {
+        if params::overlaps((before - sum) / sum, gap) {
             return Err("threads overlap");
         }
         if before - moved < params::PASS * sum && passes(start, x, a, b, params::PASS * sum.min(before)) {
@@ -175,7 +175,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
             let now = shape.collider.distance(&state.shape_pose[k], at(x), side);
             let gap = (now.value - r) / (2.0 * r);
             clearance.shape = Some(clearance.shape.map_or(gap, |c| c.min(gap)));
-            if gap < -params::OVERLAP && now.value < before().value - 2.0 * r * params::OVERLAP_DRIFT {
+            if gap < -params::OVERLAP && params::overlaps((before().value - r) / (2.0 * r), gap) {
                 return Err("a thread overlaps a shape");
             }
             // A thin shape can be jumped over: look along the way.

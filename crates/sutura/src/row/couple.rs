@@ -213,7 +213,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             }
         }
     }
-    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
+    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK.max((n * n * n) as f64 / 10.0) };
     *left = cone.solve(s, b, mu, force, &limits) / smallest;
     right.clear();
     right.resize(step.len(), DVec3::ZERO);

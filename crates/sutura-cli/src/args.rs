@@ -54,6 +54,8 @@ Examples:
   sutura run square_knot                       a built-in scene, by name
   sutura run my.toml --out /tmp/my --no-plots  a scene file
   sutura run my.toml --still 0.5 --still 2     pictures at these times [s]
+  sutura run catenary --set thread.thread.elements=25 --set \"solver.substep=1 ms\"
+                                               a scene with other values
   sutura run overhand --quiet && echo tied     for scripts
 
 Exit codes: 0 every check holds; 1 a check failed; 2 the scene could not be read.")]
@@ -64,6 +66,10 @@ pub struct Run {
     /// Folder for the results [default: out/<scene>]
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Value for a key of the scene instead of its own, for instance `thread.silk.elements=50`: names with points between them, an
+    /// entry without a name by its number, as in `phase[0].action[1].force`; may be given several times
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting)]
+    pub settings: Vec<(String, String)>,
     /// Draw no plots
     #[arg(long)]
     pub no_plots: bool,
@@ -231,6 +237,11 @@ pub enum FreeShape {
     Straight,
     /// Wound as a helix at rest
     Helix,
+}
+
+fn setting(text: &str) -> Result<(String, String), String> {
+    let (key, value) = text.split_once('=').ok_or("wanted KEY=VALUE, for instance thread.silk.elements=50")?;
+    Ok((key.trim().into(), value.trim().into()))
 }
 
 fn time(text: &str) -> Result<f64, String> {

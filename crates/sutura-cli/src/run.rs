@@ -163,7 +163,7 @@ const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
 fn grouped(series: &Series) -> Vec<(String, Figure)> {
     let Some((x_name, x_unit)) = series.columns.first() else { return Vec::new() };
     let x: Vec<f64> = series.rows.iter().map(|r| r[0]).collect();
-    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect() };
+    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect(), dots: false };
     let figure = |title: &str, y: (&str, &str), log: bool, lines: Vec<Line>| Figure {
         title: title.into(),
         x: (x_name.clone(), x_unit.clone()),

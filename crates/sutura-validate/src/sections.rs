@@ -1,0 +1,18 @@
+//! All cases, section by section. Numbers are those of the sections of the reference tables that they were set up from.
+
+mod s01_cantilever;
+
+use crate::study::Section;
+
+/// Numbers of elements of cases that are compared with a continuum.
+const ELEMENTS: [u32; 3] = [25, 50, 100];
+
+/// All sections, in order.
+pub fn sections() -> Vec<Section> {
+    vec![s01_cantilever::section()]
+}
+
+/// A vector as a scene has it, SI.
+fn vector(v: [f64; 3]) -> String {
+    format!("[{:e}, {:e}, {:e}]", v[0], v[1], v[2])
+}

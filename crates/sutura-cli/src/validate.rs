@@ -6,7 +6,7 @@ use crate::{say, table};
 use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::Path;
-use sutura_validate::{Plot, Section, SectionResult, StudyResult};
+use sutura_validate::{Plot, Section, SectionResult};
 
 /// Runs the command; false when a quantity missed its bar.
 pub fn validate(args: &Validate) -> anyhow::Result<bool> {
@@ -48,8 +48,9 @@ fn chosen(args: &Validate) -> anyhow::Result<Vec<Section>> {
         }
     }
     for section in &mut sections {
-        let whole = args.cases.is_empty() || args.cases.iter().any(|w| w.parse() == Ok(section.number));
-        section.studies.retain(|c| (whole || args.cases.iter().any(|w| c.name.contains(w.as_str()))) && (!args.quick || c.quick));
+        let number = section.number;
+        let wanted = |name: &str| args.cases.iter().any(|w| w.parse::<u32>().map_or_else(|_| name.contains(w.as_str()), |n| n == number));
+        section.studies.retain(|c| (args.cases.is_empty() || wanted(&c.name)) && (!args.quick || c.quick));
     }
     sections.retain(|s| !s.studies.is_empty());
     Ok(sections)
@@ -110,21 +111,23 @@ fn figure(plot: &Plot) -> Figure {
 
 /// What missed its bar.
 fn failures(results: &[SectionResult]) -> String {
-    let mut t = table(&["section", "case", "quantity", "wanted", "found", "error", "order", "bar", "why"], &[0, 3, 4, 5, 6]);
-    let missed = results.iter().flat_map(|s| s.rows().map(move |(study, row): (&StudyResult, _)| (s, study, row))).filter(|(.., row)| !row.passed);
-    for (section, study, row) in missed {
-        let last = |values: &[f64]| values.last().map_or_else(|| "-".into(), |v| format!("{v:.6e}"));
-        t.add_row([
-            section.number.to_string(),
-            study.name.clone(),
-            row.quantity.clone(),
-            last(&row.references),
-            last(&row.values),
-            row.errors.last().copied().flatten().map_or_else(|| "-".into(), |e| format!("{:.3} %", 100.0 * e)),
-            row.order.map_or_else(|| "-".into(), |p| format!("{p:.2}")),
-            row.bar.clone(),
-            row.reason.clone().unwrap_or_default(),
-        ]);
+    let mut out = String::new();
+    for section in results {
+        for (study, row) in section.rows().filter(|(_, row)| !row.passed) {
+            let last = |values: &[f64]| values.last().map_or_else(|| "-".into(), |v| crate::plot::number(*v));
+            let error = row.errors.last().copied().flatten().map_or_else(String::new, |e| format!(", error {:.3} %", 100.0 * e));
+            let order = row.order.map_or_else(String::new, |p| format!(", order {p:.2}"));
+            let why = row.reason.as_ref().map_or_else(String::new, |r| format!(": {r}"));
+            out.push_str(&format!(
+                "MISSED {} {}, {}: {} for {}{error}{order} (bar {}){why}\n",
+                section.number,
+                study.name,
+                row.quantity,
+                last(&row.values),
+                last(&row.references),
+                row.bar
+            ));
+        }
     }
-    t.to_string()
+    out
 }

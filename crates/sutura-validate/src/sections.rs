@@ -1,6 +1,13 @@
 //! All cases, section by section. Numbers are those of the sections of the reference tables that they were set up from.
 
 mod s01_cantilever;
+mod s02_hanging;
+mod s03_columns;
+mod s04_twist;
+mod s05_localized;
+mod s06_arcs;
+mod s07_springs;
+mod s17_frames;
 
 use crate::study::Section;
 
@@ -9,7 +16,16 @@ const ELEMENTS: [u32; 3] = [25, 50, 100];
 
 /// All sections, in order.
 pub fn sections() -> Vec<Section> {
-    vec![s01_cantilever::section()]
+    vec![
+        s01_cantilever::section(),
+        s02_hanging::section(),
+        s03_columns::section(),
+        s04_twist::section(),
+        s05_localized::section(),
+        s06_arcs::section(),
+        s07_springs::section(),
+        s17_frames::section(),
+    ]
 }
 
 /// A vector as a scene has it, SI.

@@ -4,7 +4,7 @@ use super::{ELEMENTS, vector};
 use crate::reference::material::{GRAVITY, T1};
 use crate::reference::{elastica, links};
 use crate::results::{Curve, Plot, StudyResult};
-use crate::study::{Bar, Level, Quantity, Section, Study, columns};
+use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, columns};
 use std::f64::consts::TAU;
 
 /// Length of the rods under a tip load \[m\].
@@ -34,6 +34,11 @@ pub fn section() -> Section {
     section.studies.push(independence("tip load k = 5, other settings", loaded(5.0)));
     section.studies.push(independence("own weight g = 5, other settings", weighted(5.0)));
     section.plots = plots;
+    section.left_out = &[LeftOut {
+        what: "tip moment of a whole turn",
+        why: "a moment that keeps its direction has no energy; beyond three quarters of a turn or so the rod flutters out of its plane (the run \
+              does not come to rest), and at a whole turn its end would lie in its start",
+    }];
     section
 }
 

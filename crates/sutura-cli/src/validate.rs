@@ -93,7 +93,10 @@ fn write(results: &[SectionResult], out: &Path) -> anyhow::Result<()> {
     put(&folder.join("results.csv"), &sutura_validate::csv(results))?;
     put(&folder.join("results.json"), &serde_json::to_string_pretty(results)?)?;
     for plot in results.iter().flat_map(|s| &s.plots) {
-        figure(plot).write_svg(&folder.join(plot.file))?;
+        let figure = figure(plot);
+        if !figure.is_empty() {
+            figure.write_svg(&folder.join(plot.file))?;
+        }
     }
     Ok(())
 }

@@ -22,7 +22,7 @@ pub fn section() -> Section {
          Forces are over the weight, lengths over the length. Frequencies are those of the chain after what implicit Euler makes of them, \
          atan(w h) / h.",
     );
-    for span in [0.2, 0.5, 0.8, 0.95] {
+    for span in [0.3, 0.5, 0.8, 0.95] {
         section.studies.push(hanging(span, 0.0));
     }
     section.studies.push(hanging(0.5, 0.2));
@@ -39,7 +39,7 @@ pub fn section() -> Section {
 }
 
 fn hanging(span: f64, rise: f64) -> Study {
-    const COUNTS: [u32; 3] = [10, 20, 40];
+    const COUNTS: [u32; 3] = [20, 40, 80];
     let end = [span * LENGTH, 0.0, rise * LENGTH];
     // Two legs of half the length each.
     let chord = span.hypot(rise);
@@ -60,8 +60,7 @@ fn hanging(span: f64, rise: f64) -> Study {
         -least / LENGTH
     };
     let mut study = Study::new(if rise == 0.0 { format!("chain, span {span}") } else { format!("chain, span {span}, rise {rise}") }, "chain_hanging")
-        .set("thread.chain.path", format!("[{{ from = [0, 0, 0] }}, {{ line_to = {} }}, {{ line_to = {} }}]", vector(low), vector(end)))
-        .elements("chain", &COUNTS)
+        .levels(COUNTS.map(|n| Level::new(n.to_string(), 1.0 / f64::from(n), &[("thread.chain.points", legs(n, low, end))])).into())
         .quick(span == 0.5 && rise == 0.0)
         .quantity(Quantity::measured("sag", lowest, of(&|c| -c.2.iter().copied().fold(0.0, f64::min)), CHAIN, Bar::Within(0.001)))
         .quantity(Quantity::last("horizontal force", "right_force.x", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005)).references(of(&|c| c.0)))
@@ -75,6 +74,16 @@ fn hanging(span: f64, rise: f64) -> Study {
             .curve(|outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect());
     }
     study
+}
+
+/// Points of two straight legs from the origin over `low` to `end`, with n links.
+fn legs(n: u32, low: [f64; 3], end: [f64; 3]) -> String {
+    let between = |a: [f64; 3], b: [f64; 3], part: f64| vector(std::array::from_fn(|k| a[k] + part * (b[k] - a[k])));
+    let point = |i: u32| {
+        let part = 2.0 * f64::from(i) / f64::from(n);
+        if part < 1.0 { between([0.0; 3], low, part) } else { between(low, end, part - 1.0) }
+    };
+    format!("[{}]", (0..=n).map(point).collect::<Vec<_>>().join(", "))
 }
 
 fn heavy(weight: f64, ends: Ends) -> Study {
@@ -116,22 +125,22 @@ fn swinging(mode: usize) -> Study {
 }
 
 fn dropped() -> Study {
-    let mut study = Study::new("chain let go level", "chain_dropped").substeps(&[4e-4, 2e-4, 1e-4]);
+    let mut study = Study::new("chain let go level", "chain_dropped").substeps(&[1e-4, 5e-5, 2.5e-5]);
     for time in [0.08, 0.12, 0.16, 0.20] {
         let exact = links::chain_swing(10, 0.1, time);
-        for (i, axis) in ["x", "z"].into_iter().enumerate() {
-            let at = move |outcome: &Outcome| columns(outcome, "tip", ["time", axis]).iter().find(|r| (r[0] - time).abs() < 1e-6).map_or(f64::NAN, |r| 1e3 * r[1]);
-            study = study.quantity(
-                Quantity::measured(format!("tip {axis} at {time} s [mm]"), at, vec![1e3 * exact[i]], "equations of motion", Bar::Order(0.01, 0.8)).scale(100.0),
-            );
-        }
+        let off = move |outcome: &Outcome| {
+            let tip = columns(outcome, "tip", ["time", "x", "z"]).into_iter().find(|r| (r[0] - time).abs() < 1e-6);
+            tip.map_or(f64::NAN, |[_, x, z]| 1e3 * (x - exact[0]).hypot(z - exact[1]))
+        };
+        let name = format!("tip at {time} s, distance from ({:.4}, {:.4}) mm [mm]", 1e3 * exact[0], 1e3 * exact[1]);
+        study = study.quantity(Quantity::measured(name, off, vec![0.0], "equations of motion", Bar::Order(0.01, 0.8)).scale(100.0));
     }
     study.quantity(Quantity::measured("greatest elongation", |o| o.report.work.max_length_error, Vec::new(), "inextensible", Bar::AtMost(1e-4)))
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
     let mut curves = Vec::new();
-    for span in [0.2, 0.5, 0.8, 0.95] {
+    for span in [0.3, 0.5, 0.8, 0.95] {
         let [sag, a, _] = catenary::level(span);
         let height = |x: f64| a * ((x - 0.5 * span) / a).cosh() - a - sag;
         let points = (0..=60).map(|i| span * f64::from(i) / 60.0).map(|x| (x, height(x))).collect();
@@ -140,5 +149,5 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
             curves.push(Curve { name: "ours".into(), points: s.curve.clone(), dots: true });
         }
     }
-    vec![Plot { file: "catenary", title: "Chains of 40 links between two pins".into(), x: ("x / L", ""), y: ("z / L", ""), curves }]
+    vec![Plot { file: "catenary", title: "Chains of 80 links between two pins".into(), x: ("x / L", ""), y: ("z / L", ""), curves }]
 }

@@ -18,8 +18,8 @@ pub fn section() -> Section {
         let name = format!("2-0 monofilament, R = 20 mm, {} degrees, k = {k}", (angle.to_degrees()).round());
         section.studies.push(arc(name, T1, 0.02, angle, k, k == 7.2));
     }
-    // A diameter of 2 keeps shear and stretch as small as they are in the literature's rod; E then follows from EI.
-    let thin = Rod { diameter: 2.0, young: 1e7 / 12.0 * 4.0 / PI, poisson: 0.0, density: 1.0 };
+    // A diameter of 2 keeps shear and stretch as small as they are in the literature's rod; E then follows from EI. It is light, so that it comes to rest soon.
+    let thin = Rod { diameter: 2.0, young: 1e7 / 12.0 * 4.0 / PI, poisson: 0.0, density: 1e-6 };
     for load in [300.0, 450.0, 600.0] {
         section.studies.push(arc(format!("R = 100, GJ = EI, P = {load}"), thin, 100.0, FRAC_PI_4, load * 1e4 / thin.ei(), false));
     }

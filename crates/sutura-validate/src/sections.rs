@@ -7,6 +7,9 @@ mod s04_twist;
 mod s05_localized;
 mod s06_arcs;
 mod s07_springs;
+mod s08_vibration;
+mod s09_capstan;
+mod s13_identities;
 mod s17_frames;
 
 use crate::study::Section;
@@ -24,6 +27,9 @@ pub fn sections() -> Vec<Section> {
         s05_localized::section(),
         s06_arcs::section(),
         s07_springs::section(),
+        s08_vibration::section(),
+        s09_capstan::section(),
+        s13_identities::section(),
         s17_frames::section(),
     ]
 }

@@ -174,7 +174,8 @@ impl Frame<'_> {
             color += usize::from(i > 0 && !line.dots);
             let [r, g, b] = THREAD_COLORS[color % THREAD_COLORS.len()];
             if line.dots {
-                let dots = line.points.iter().filter(|p| figure.can_show(p)).map(|(x, y)| Circle::new((*x, y * factor), 5 * FINE / 2, RGBColor(r, g, b).filled()));
+                let dots =
+                    line.points.iter().filter(|p| figure.can_show(p)).map(|(x, y)| Circle::new((*x, y * factor), 5 * FINE / 2, RGBColor(r, g, b).filled()));
                 let drawn = chart.draw_series(dots)?;
                 drawn.label(line.name.clone()).legend(move |(lx, ly)| Circle::new((lx + px(8), ly), 5 * FINE / 2, RGBColor(r, g, b).filled()));
                 continue;

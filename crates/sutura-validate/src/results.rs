@@ -16,6 +16,7 @@ pub struct SectionResult {
     /// Its studies.
     pub studies: Vec<StudyResult>,
     /// Pictures of them.
+    #[serde(skip)]
     pub plots: Vec<Plot>,
     /// What is not run: what and why.
     pub left_out: Vec<(&'static str, &'static str)>,
@@ -61,7 +62,7 @@ pub struct Row {
 }
 
 /// A picture of curves.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Plot {
     /// File name without ending.
     pub file: &'static str,
@@ -76,7 +77,7 @@ pub struct Plot {
 }
 
 /// A curve of a plot.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct Curve {
     /// Name in the legend.
     pub name: String,
@@ -250,7 +251,11 @@ pub fn markdown(results: &[SectionResult], plots: &str) -> String {
                 if r.passed { "pass" } else { "**FAIL**" }
             );
         }
-        let reasons: Vec<String> = s.rows().filter(|(_, r)| !r.passed).map(|(study, r)| format!("- {}, {}: {}", study.name, r.quantity, r.reason.as_deref().unwrap_or("reason not known"))).collect();
+        let reasons: Vec<String> = s
+            .rows()
+            .filter(|(_, r)| !r.passed)
+            .map(|(study, r)| format!("- {}, {}: {}", study.name, r.quantity, r.reason.as_deref().unwrap_or("reason not known")))
+            .collect();
         if !reasons.is_empty() {
             let _ = write!(out, "\nFailing:\n\n{}\n", reasons.join("\n"));
         }

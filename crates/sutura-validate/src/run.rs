@@ -60,7 +60,13 @@ pub fn run(sections: &[Section], jobs: usize, tell: &(dyn Fn(&Progress) + Sync))
         StudyResult::new(study, &values, &problems, curve)
     };
     let mut study = study;
-    sections.iter().map(|s| { let studies = s.studies.iter().map(&mut study).collect(); SectionResult::new(s, studies) }).collect()
+    sections
+        .iter()
+        .map(|s| {
+            let studies = s.studies.iter().map(&mut study).collect();
+            SectionResult::new(s, studies)
+        })
+        .collect()
 }
 
 fn take<'a, T>(work: &'a [T], next: &AtomicUsize) -> Option<(usize, &'a T)> {
@@ -92,7 +98,9 @@ fn outcome(study: &Study, level: &Level) -> Result<Outcome, String> {
 fn problem(outcome: &Outcome) -> Option<String> {
     let report = &outcome.report;
     let late = report.phases.iter().find(|p| ["out of time", "given up", "stopped"].contains(&p.ended_by.as_str()));
-    if !report.passed && let Some(phase) = late {
+    if !report.passed
+        && let Some(phase) = late
+    {
         return Some(format!("phase `{}` ended by: {}", phase.name, phase.ended_by));
     }
     if let Some(check) = report.checks.iter().find(|c| !c.passed) {

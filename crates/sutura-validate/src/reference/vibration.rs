@@ -45,8 +45,7 @@ pub fn euler_decay(w: f64, h: f64) -> f64 {
 
 /// Frequency \[Hz\] of a signal that swings about zero, from its crossings (linear between samples).
 pub fn frequency(signal: &[(f64, f64)]) -> f64 {
-    let crossings: Vec<f64> =
-        signal.windows(2).filter(|w| w[0].1 * w[1].1 < 0.0).map(|w| w[0].0 + (w[1].0 - w[0].0) * w[0].1 / (w[0].1 - w[1].1)).collect();
+    let crossings: Vec<f64> = signal.windows(2).filter(|w| w[0].1 * w[1].1 < 0.0).map(|w| w[0].0 + (w[1].0 - w[0].0) * w[0].1 / (w[0].1 - w[1].1)).collect();
     match crossings.as_slice() {
         [first, .., last] => 0.5 * (crossings.len() - 1) as f64 / (last - first),
         _ => f64::NAN,

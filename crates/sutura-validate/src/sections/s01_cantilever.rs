@@ -57,7 +57,11 @@ fn tip_load(k: f64) -> Study {
         .quantity(Quantity::last("drop / L", "tip.z", -1.0 / LENGTH, drop, source, Bar::Order(0.01, 1.8)))
         .quantity(Quantity::last("slope at the tip [rad]", "slope", 1.0, slope, source, Bar::Order(0.01, 1.8)))
         .quantity(discrete("drop / L", LENGTH, k, 0.0));
-    if DRAWN.contains(&k) { study.curve(|outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect()) } else { study }
+    if DRAWN.contains(&k) {
+        study.curve(|outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect())
+    } else {
+        study
+    }
 }
 
 /// Drop against that of a chain of as many links.

@@ -1,9 +1,9 @@
 //! Columns that stand, fall and buckle.
 
 use super::{ELEMENTS, vector};
+use crate::reference::elastica;
 use crate::reference::links::{self, End};
 use crate::reference::material::{GRAVITY, T1};
-use crate::reference::elastica;
 use crate::results::{Curve, Plot, StudyResult};
 use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, last};
 use std::f64::consts::PI;
@@ -22,11 +22,13 @@ pub fn section() -> Section {
          them by about a thousandth of their length they stand, or fall. Columns shortened by a part e of their length, against the elastica: \
          load over Euler's, bow over length.",
     );
-    for (name, start, end) in [("pinned", End::Pinned, End::Pinned), ("clamped and pinned", End::Clamped, End::Pinned), ("clamped", End::Clamped, End::Clamped)] {
+    for (name, start, end) in [("pinned", End::Pinned, End::Pinned), ("clamped and pinned", End::Clamped, End::Pinned), ("clamped", End::Clamped, End::Clamped)]
+    {
         for part in PARTS {
             let load = |n| part * links::critical_load(n, start, end) * T1.ei() / (LENGTH * LENGTH);
             let levels = COUNTS.map(|n| level(n, &[("grip.head.force", format!("{:e}", load(n)))]));
-            let study = Study::new(format!("{name}, {part} of the critical load"), "column").set("grip.foot.hold", hold(start)).set("grip.head.hold", hold(end));
+            let study =
+                Study::new(format!("{name}, {part} of the critical load"), "column").set("grip.foot.hold", hold(start)).set("grip.head.hold", hold(end));
             section.studies.push(stands(study.levels(levels.into()), part, LENGTH).quick(start == End::Pinned));
         }
     }
@@ -38,7 +40,9 @@ pub fn section() -> Section {
     for part in PARTS {
         let length = |n| (part * links::heavy_column(n) * T1.ei() / T1.weight()).cbrt();
         let levels = COUNTS.map(|n| level(n, &[("thread.rod.line.to", vector([0.0, 0.0, length(n)]))]));
-        let study = Study::new(format!("own weight, {part} of the critical one"), "column_free").set("solver.gravity", vector([0.0, 0.0, -GRAVITY])).set("solver.substep", "5 ms");
+        let study = Study::new(format!("own weight, {part} of the critical one"), "column_free")
+            .set("solver.gravity", vector([0.0, 0.0, -GRAVITY]))
+            .set("solver.substep", "5 ms");
         section.studies.push(stands(study.levels(levels.into()), part, 0.2));
     }
     for e in SHORTENINGS {

@@ -62,7 +62,13 @@ fn study(case: (f64, f64)) -> Study {
         .quantity(Quantity::last("torque [mN m]", "torque", 1e3, 1e3 * h.moment * T1.ei() / LENGTH, source, Bar::Within(0.02)))
         .quantity(Quantity::measured("largest error of the envelope", error, vec![0.0], source, Bar::Within(0.02)).scale(1.0))
         .quantity(Quantity::measured("turns lost of twist + writhe", lost, Vec::new(), "conserved", Bar::AtMost(0.01)))
-        .quantity(Quantity::measured("largest change of twist + writhe in a frame [turns]", jump, Vec::new(), "2 where a strand passes through", Bar::AtMost(0.5)))
+        .quantity(Quantity::measured(
+            "largest change of twist + writhe in a frame [turns]",
+            jump,
+            Vec::new(),
+            "2 where a strand passes through",
+            Bar::AtMost(0.5),
+        ))
         .curve(move |o| envelope(o, &h))
 }
 
@@ -79,5 +85,11 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
             curves.push(Curve { name: format!("{}, ours", s.name), points, dots: true });
         }
     }
-    vec![Plot { file: "localized", title: "Envelope of the localized helix".into(), x: ("distance from the middle times decay", ""), y: ("envelope", ""), curves }]
+    vec![Plot {
+        file: "localized",
+        title: "Envelope of the localized helix".into(),
+        x: ("distance from the middle times decay", ""),
+        y: ("envelope", ""),
+        curves,
+    }]
 }

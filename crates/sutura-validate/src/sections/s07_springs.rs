@@ -28,7 +28,8 @@ pub fn section() -> Section {
     section.studies.push(quarter([1.0, 0.0], [0.75 * PI - 2.0, 0.5], "quarter arc, load along the tip's tangent"));
     section.studies.push(straightened());
     section.studies.push(ring());
-    section.left_out = &[LeftOut { what: "spring with its end kept from turning", why: "a clamp that slides along the axis keeps the end from moving across, too" }];
+    section.left_out =
+        &[LeftOut { what: "spring with its end kept from turning", why: "a clamp that slides along the axis keeps the end from moving across, too" }];
     section
 }
 
@@ -116,11 +117,7 @@ fn ring() -> Study {
     const FORCE: f64 = 1e-5;
     let factor = T1.ei() / (FORCE * R.powi(3));
     // The ring is a closed polygon of chords: what it opens by counts from its own width.
-    let opened = move |probe: &'static str| {
-        move |o: &sutura_scene::Outcome| {
-            factor * (crate::study::last(o, probe) - first(o, probe))
-        }
-    };
+    let opened = move |probe: &'static str| move |o: &sutura_scene::Outcome| factor * (crate::study::last(o, probe) - first(o, probe));
     Study::new("ring pulled apart", "ring_pulled")
         .elements("ring", &[40, 80, 160])
         .quantity(Quantity::measured("opening over F R^3 / EI", opened("along"), vec![0.25 * PI - 2.0 / PI], "Castigliano", Bar::Order(0.01, 1.8)))

@@ -93,7 +93,13 @@ fn cantilever_decay() -> Study {
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
         .levels(levels.into())
         .quantity(measured(STEPS.map(|h| hz(w, h)).to_vec(), "implicit Euler", Bar::Within(0.005)))
-        .quantity(Quantity::measured("decay [1/s]", |o| decay(&series(o, "tip")), STEPS.map(|h| euler_decay(w, h)).to_vec(), "implicit Euler", Bar::Within(0.01)))
+        .quantity(Quantity::measured(
+            "decay [1/s]",
+            |o| decay(&series(o, "tip")),
+            STEPS.map(|h| euler_decay(w, h)).to_vec(),
+            "implicit Euler",
+            Bar::Within(0.01),
+        ))
         .curve(|o| series(o, "tip").into_iter().map(|(t, z)| (t, z / (1e-3 * LENGTH))).collect())
 }
 
@@ -123,13 +129,9 @@ fn string(mode: u32) -> Study {
     // Stretched between fixed pins by the strain that the tension makes.
     let stretched = L * (1.0 + TENSION / T1.ea());
     let shape = move |n| shaped(n, stretched, |s| (f64::from(mode) * PI * s).sin() * 0.1);
-    timed(Study::new(format!("stiff string, 100 mm, 0.1 N, mode {mode}"), "string"), h, 6.0, TAU * f).levels(COUNTS.map(|n| level(n, shape(n))).into()).quantity(Quantity::measured(
-        "frequency [Hz]",
-        |o| frequency(&series(o, "bow")),
-        vec![hz(TAU * f, h)],
-        "stiff string",
-        Bar::Order(0.005, 1.8),
-    ))
+    timed(Study::new(format!("stiff string, 100 mm, 0.1 N, mode {mode}"), "string"), h, 6.0, TAU * f)
+        .levels(COUNTS.map(|n| level(n, shape(n))).into())
+        .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "bow")), vec![hz(TAU * f, h)], "stiff string", Bar::Order(0.005, 1.8)))
 }
 
 fn tip_mass() -> Study {
@@ -205,5 +207,11 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
         Curve { name: "theory with implicit Euler's decay".into(), points: spectrum(&theory), dots: false },
         Curve { name: "ours".into(), points: spectrum(&ours), dots: true },
     ];
-    vec![Plot { file: "vibration", title: "Spectrum of the tip of a cantilever let go in its first mode, h = 0.25 ms".into(), x: ("frequency", "Hz"), y: ("amplitude", ""), curves }]
+    vec![Plot {
+        file: "vibration",
+        title: "Spectrum of the tip of a cantilever let go in its first mode, h = 0.25 ms".into(),
+        x: ("frequency", "Hz"),
+        y: ("amplitude", ""),
+        curves,
+    }]
 }

@@ -22,9 +22,10 @@ pub fn section() -> Section {
     section.studies.push(spring());
     section.studies.push(spinning());
     section.studies.push(pendulum());
-    section.left_out = &[
-        LeftOut { what: "torque-free top, gyroscope", why: "there are no free rigid bodies; a thread's gyroscopic moment is left out, see docs/theory.md 3" },
-    ];
+    section.left_out = &[LeftOut {
+        what: "torque-free top, gyroscope",
+        why: "there are no free rigid bodies; a thread's gyroscopic moment is left out, see docs/theory.md 3",
+    }];
     section
 }
 
@@ -86,7 +87,9 @@ fn spring() -> Study {
         }
         worst / START
     };
-    Study::new("one spring, 2000 substeps", "spring_mass").quick(true).quantity(Quantity::measured("largest difference over the start", worst, vec![0.0], "recursion", Bar::Within(1e-6)).scale(1.0))
+    Study::new("one spring, 2000 substeps", "spring_mass")
+        .quick(true)
+        .quantity(Quantity::measured("largest difference over the start", worst, vec![0.0], "recursion", Bar::Within(1e-6)).scale(1.0))
 }
 
 fn spinning() -> Study {

@@ -80,15 +80,7 @@ fn turned() -> Study {
     let level = |name: &str, axes: [[f64; 3]; 3]| {
         let along = axes[0].map(|c| c * LENGTH);
         let force = axes[2].map(|c| -1e-3 * c);
-        Level::new(
-            name,
-            0.0,
-            &[
-                ("thread.rod.line.to", vector(along)),
-                ("thread.rod.d1", vector(axes[1])),
-                ("phase.load.action[0]", load(force, [0.0; 3])),
-            ],
-        )
+        Level::new(name, 0.0, &[("thread.rod.line.to", vector(along)), ("thread.rod.d1", vector(axes[1])), ("phase.load.action[0]", load(force, [0.0; 3]))])
     };
     let (s, c) = 0.7_f64.sin_cos();
     let (u, v) = 1.1_f64.sin_cos();
@@ -99,7 +91,11 @@ fn turned() -> Study {
         level("oblique", [[c * v, s, -c * u], [-s * v, c, s * u], [u, 0.0, v]]),
     ];
     let size = |o: &sutura_scene::Outcome| ["tip.x", "tip.y", "tip.z"].map(|p| last(o, p)).iter().map(|v| v * v).sum::<f64>().sqrt() / LENGTH;
-    Study::new("whole scene turned", "cantilever")
-        .levels(levels)
-        .quantity(Quantity::measured("distance of the tip from the clamp / L", size, Vec::new(), "each other", Bar::Same(1e-9)))
+    Study::new("whole scene turned", "cantilever").levels(levels).quantity(Quantity::measured(
+        "distance of the tip from the clamp / L",
+        size,
+        Vec::new(),
+        "each other",
+        Bar::Same(1e-9),
+    ))
 }

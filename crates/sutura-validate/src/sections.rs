@@ -9,6 +9,8 @@ mod s06_arcs;
 mod s07_springs;
 mod s08_vibration;
 mod s09_capstan;
+mod s11_writhe;
+mod s12_knots;
 mod s13_identities;
 mod s17_frames;
 
@@ -29,6 +31,8 @@ pub fn sections() -> Vec<Section> {
         s07_springs::section(),
         s08_vibration::section(),
         s09_capstan::section(),
+        s11_writhe::section(),
+        s12_knots::section(),
         s13_identities::section(),
         s17_frames::section(),
     ]

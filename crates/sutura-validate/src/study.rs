@@ -32,7 +32,7 @@ pub struct LeftOut {
 pub struct Study {
     /// Name, unique in its section.
     pub name: String,
-    /// Name of the scene in `scenes/validation/`.
+    /// Name of the scene in `scenes/validation/`; empty where nothing is simulated.
     pub scene: &'static str,
     /// Values set in the scene for all runs: path and value.
     pub settings: Vec<(String, String)>,
@@ -112,7 +112,12 @@ impl Study {
             quick: false,
         }
     }
+    /// Nothing to simulate: measures call a function of the engine themselves.
+    pub fn direct(name: impl Into<String>) -> Study {
+        Study::new(name, "")
+    }
     /// Sets a value of the scene in all runs.
+    #[expect(clippy::needless_pass_by_value, reason = "numbers and texts alike")]
     pub fn set(mut self, path: &str, value: impl ToString) -> Study {
         self.settings.push((path.into(), value.to_string()));
         self
@@ -122,7 +127,7 @@ impl Study {
         let level = |n: &u32| Level { label: n.to_string(), size: 1.0 / f64::from(*n), settings: vec![(format!("thread.{thread}.elements"), n.to_string())] };
         self.levels(counts.iter().map(level).collect())
     }
-    /// One run for each substep \[s\], with frames as long where `frames`.
+    /// One run for each substep \[s\].
     pub fn substeps(self, substeps: &[f64]) -> Study {
         let level = |h: &f64| Level { label: time(*h), size: *h, settings: vec![("solver.substep".into(), format!("{h:e}"))] };
         self.levels(substeps.iter().map(level).collect())

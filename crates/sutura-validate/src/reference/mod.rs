@@ -4,6 +4,7 @@
 //! function says otherwise. Each is tested against the tables from which this validation was set up.
 
 pub mod catenary;
+pub mod curves;
 pub mod elastica;
 pub mod kirchhoff;
 pub mod links;

@@ -88,6 +88,6 @@ mod tests {
         assert!((h.tension * ei / (l * l) - 1.58416e-2).abs() < 1e-7 && (h.moment * ei / l - 2.10038e-4).abs() < 1e-9);
         assert!((h.angle.to_degrees() - 41.324).abs() < 1e-3 && (h.decay - 9.96).abs() < 5e-3);
         let h = localized(0.03, 27.0 * std::f64::consts::TAU, 0.789 / 1.345);
-        assert!((h.moment - 98.541_496_17).abs() < 1e-6 && (h.tension - 2900.993_206).abs() < 1e-5 && (h.angle.to_degrees() - 47.6515).abs() < 1e-4);
+        assert!((h.moment - 98.541_496_17).abs() < 1e-6 && (h.tension - 2_900.993_206).abs() < 1e-5 && (h.angle.to_degrees() - 47.6515).abs() < 1e-4);
     }
 }

@@ -1,6 +1,7 @@
 //! Threads around a cylinder.
 
 use super::vector;
+use crate::reference::material::T2;
 use crate::results::{Curve, Plot, StudyResult};
 use crate::study::{Bar, Level, Quantity, Section, Study, series};
 use std::f64::consts::PI;
@@ -52,8 +53,8 @@ fn sliding(mu: f64, degrees: f64) -> Study {
         vector(exit)
     );
     let exact = (mu * angle * THIN).exp();
-    // Farther than the thread stretches (EA = 6.3 N), so that all of it slides.
-    let drawn = 0.008 + 0.1 * exact * 0.2 / 6.28;
+    // Farther than the thread stretches, so that all of it slides.
+    let drawn = 0.008 + 0.1 * exact * 0.2 / T2.ea();
     let sign = tangent[2];
     let ends = |n: u32| Level::new(n.to_string(), 1.0 / f64::from(n), &[("thread.thread.elements", n.to_string())]);
     let counts = if turns > 0.5 { [195, 260] } else { [130, 180] };

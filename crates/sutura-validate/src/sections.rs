@@ -12,6 +12,7 @@ mod s09_capstan;
 mod s11_writhe;
 mod s12_knots;
 mod s13_identities;
+mod s14_friction;
 mod s17_frames;
 
 use crate::study::Section;
@@ -34,6 +35,7 @@ pub fn sections() -> Vec<Section> {
         s11_writhe::section(),
         s12_knots::section(),
         s13_identities::section(),
+        s14_friction::section(),
         s17_frames::section(),
     ]
 }

@@ -9,6 +9,7 @@ mod s06_arcs;
 mod s07_springs;
 mod s08_vibration;
 mod s09_capstan;
+mod s10_knot_force;
 mod s11_writhe;
 mod s12_knots;
 mod s13_identities;
@@ -32,6 +33,7 @@ pub fn sections() -> Vec<Section> {
         s07_springs::section(),
         s08_vibration::section(),
         s09_capstan::section(),
+        s10_knot_force::section(),
         s11_writhe::section(),
         s12_knots::section(),
         s13_identities::section(),

@@ -250,7 +250,7 @@ is compared with its reference: the error, and the order at which it falls. The 
   validation/*.svg         plots against theory
   validation/results.json  the same numbers in full, also as results.csv
 
-The numbers do not depend on --jobs. All cases take some minutes on two cores.
+The numbers do not depend on --jobs. All cases take about a minute.
 
 Examples:
   sutura validate                   everything, to out/validation.md
@@ -280,7 +280,7 @@ pub struct Validate {
     /// Say which run was done and how long it took, instead of a progress bar
     #[arg(long, short)]
     pub verbose: bool,
-    /// Write no file, print the tables of what missed its bar
+    /// Write no file, print what missed its bar
     #[arg(long, conflicts_with = "out")]
     pub dry: bool,
 }

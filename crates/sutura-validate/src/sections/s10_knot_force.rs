@@ -58,7 +58,11 @@ fn force_at(o: &Outcome, eps: f64) -> f64 {
 fn drawn(mu: f64) -> Study {
     let reason =
         "not known: what friction adds is two to four times theory's, and more the larger eps; without friction force and energy are within their bars";
-    let mut study = Study::new(format!("mu = {mu}"), "knot_force").set("friction.default", mu).elements("rod", &[200, 400]).curve(curve);
+    let mut study = Study::new(format!("mu = {mu}"), "knot_force").set("friction.default", mu).elements("rod", &[200, 400]).curve(move |o| {
+        let drifting = if mu > 0.0 { f64::INFINITY } else { DRIFTING };
+        let times = series(o, "curvature").into_iter().map(|p| p.0).filter(|t| *t > GATHERING);
+        curve(o).into_iter().zip(times).filter(|(_, t)| *t < drifting).map(|(p, _)| p).collect()
+    });
     // Without friction nothing keeps the loop in the middle of the thread: a tight one drifts off.
     for eps in EPSILONS.into_iter().filter(|eps| mu > 0.0 || *eps < 0.2) {
         let quantity =

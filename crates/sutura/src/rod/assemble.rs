@@ -220,7 +220,7 @@ impl At<'_> {
         let off = Vec2::load(log(u0), log(u1));
         let mut torque = off.scaled(x).plus(t, z * t.dot(&off));
         let mut inertia = Sym2::scalar(x).square(t, z);
-        // Only what is attached has different moments across.
+        // Only flat sections and what is attached have different moments across.
         if i0.x != i0.y || i1.x != i1.y {
             let y = Vec2::load(q[low] * DVec3::Y, q[high] * DVec3::Y);
             let more = lanes(i0.y, i1.y) - x;
@@ -246,8 +246,7 @@ impl At<'_> {
     }
 }
 
-/// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation. Bending stiffness is the same
-/// in both directions.
+/// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation.
 #[inline(always)]
 fn joint_terms(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec2, gamma: f64x2) -> (Vec2, Sym2) {
     let one = f64x2::splat(1.0);
@@ -260,7 +259,12 @@ fn joint_terms(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec
     let [m1, m2, m3] = &j.middle;
     let w = m1.scaled(j.angle.x).plus(m2, j.angle.y).plus(m3, j.angle.z);
     let axis = m3.scaled(s).plus(&w, -(c * j.angle.z));
-    let b = Sym2::scalar(bend * s * s).square(&w, bend * c * (cc - (s + s))).square(&axis, twist - bend);
+    let mut b = Sym2::scalar(bend * s * s).square(&w, bend * c * (cc - (s + s))).square(&axis, twist - bend);
+    // Only flat sections are stiffer one way than the other.
+    let flat = stiffness.y - stiffness.x;
+    if flat != f64x2::ZERO {
+        b = b.square(&m2.scaled(s).plus(&w, -(c * j.angle.y)), flat * (one + gamma));
+    }
     let turned = m1.scaled(moment.x).plus(m2, moment.y).plus(m3, moment.z);
     (turned.scaled(s).plus(&w, -(c * j.angle.dot(&moment))), b)
 }
@@ -279,7 +283,7 @@ mod tests {
     use super::*;
     use crate::math::exp;
     use crate::rod::element_strain;
-    use crate::{Material, RodSpec, World};
+    use crate::{Material, RodSpec, Section, World};
 
     /// Numbers in [-0.5, 0.5) from a seed.
     fn noise(seed: &mut u64) -> f64 {
@@ -293,11 +297,17 @@ mod tests {
 
     #[test]
     fn the_exact_hessian_is_the_derivative_of_the_residual() {
+        for section in [Section::Round, Section::Rectangle([2e-3, 5e-3])] {
+            compare_derivatives(section);
+        }
+    }
+
+    fn compare_derivatives(section: Section) {
         // A bent, twisted, stretched rod with soft section, so that every term matters.
         let mut seed = 7;
         let n = 5;
         let mut world = World::default();
-        let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0));
+        let spec = RodSpec { section, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0)) };
         world.insert_rod(&spec).unwrap();
         let (model, mut state) = world.into_parts();
         for i in 0..=n {

@@ -30,21 +30,19 @@ pub(crate) struct Areas {
 impl Section {
     /// Constants of the section, `size` times as large; `radius` \[m\] is that of a round one.
     pub(crate) fn areas(&self, radius: f64, size: f64) -> Areas {
-        match *self {
+        match self.scaled(size) {
             Section::Round => {
                 let r = radius * size;
                 let area = PI * r * r;
                 let i = 0.25 * area * r * r;
                 Areas { area, about: [i, i], torsion: 2.0 * i }
             }
-            Section::Ellipse(axes) => {
-                let [a, b] = axes.map(|x| x * size);
+            Section::Ellipse([a, b]) => {
                 let area = PI * a * b;
                 // Torsion: Saint-Venant 1855; Timoshenko and Goodier, Theory of Elasticity, section 107.
                 Areas { area, about: [0.25 * area * b * b, 0.25 * area * a * a], torsion: area * (a * b) * (a * b) / (a * a + b * b) }
             }
-            Section::Rectangle(sides) => {
-                let [a, b] = sides.map(|x| x * size);
+            Section::Rectangle([a, b]) => {
                 let area = a * b;
                 Areas { area, about: [area * b * b / 12.0, area * a * a / 12.0], torsion: torsion_of_rectangle(a.max(b), a.min(b)) }
             }
@@ -56,6 +54,15 @@ impl Section {
         match self {
             Section::Round | Section::Ellipse(_) => 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu),
             Section::Rectangle(_) => 10.0 * (1.0 + nu) / (12.0 + 11.0 * nu),
+        }
+    }
+
+    /// The same, `size` times as large. A round one is as large as the thread's radius.
+    pub fn scaled(&self, size: f64) -> Self {
+        match *self {
+            Section::Round => Section::Round,
+            Section::Ellipse(axes) => Section::Ellipse(axes.map(|x| x * size)),
+            Section::Rectangle(sides) => Section::Rectangle(sides.map(|x| x * size)),
         }
     }
 

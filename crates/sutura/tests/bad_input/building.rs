@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_usable, point, step, straight, thread};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion,
-    ShapeSpec, Shear, World,
+    Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings,
+    ShapeMotion, ShapeSpec, Shear, World,
 };
 
 /// An error of the kind that names a field, and the field.

@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_finite, assert_usable, point, step, straight, thread};
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec,
-    Shear, Stretch, World,
+    Along, Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, Profile, RestShape, RodSpec, Section, Settings,
+    ShapeMotion, ShapeSpec, Shear, Stretch, World,
 };
 
 #[test]

@@ -259,6 +259,10 @@ impl RodSpec {
             }
         }
         let sections: Vec<_> = middles.iter().map(|s| SectionStiffness::new(&self.material, &self.section, self.radius, &self.along, *s)).collect();
+        for (section, l) in sections.iter().zip(&rest_lengths) {
+            let stiffness = (section.ea + section.bend.max_element()) / l;
+            check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
+        }
         if self.material.plasticity.is_some() && sections.iter().any(|s| s.bend.x != s.bend.y) {
             return Err(Error::invalid(what, "material.plasticity", self.section, "no plasticity for a section that is stiffer one way than the other"));
         }

@@ -121,7 +121,7 @@ fn free_thread(shape: FreeShape, elements: u32, frames: u32) -> anyhow::Result<F
 }
 
 fn knot(name: &str, rod_ns: Option<f64>) -> anyhow::Result<Knot> {
-    let scene = run::load(name).with_context(|| format!("the benchmark needs the built-in scene `{name}`"))?;
+    let scene = run::load(name, &[]).with_context(|| format!("the benchmark needs the built-in scene `{name}`"))?;
     let outcome = run::simulate(Runner::new(scene)?, false);
     let r = &outcome.report;
     let elements: usize = r.threads.iter().map(|t| t.elements).sum();

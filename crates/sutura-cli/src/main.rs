@@ -8,6 +8,7 @@ mod presets;
 mod run;
 mod scenes;
 mod still;
+mod validate;
 
 use args::{Cli, Command};
 use clap::Parser as _;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Some(Command::Knot(a)) => knot::knot(&a),
         Some(Command::Presets(a)) => presets::presets(&a).map(|()| true),
         Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
+        Some(Command::Validate(a)) => validate::validate(&a),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

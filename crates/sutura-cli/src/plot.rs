@@ -35,6 +35,8 @@ pub struct Line {
     pub name: String,
     /// Points in order of the abscissa; those not finite leave a gap.
     pub points: Vec<(f64, f64)>,
+    /// Whether the points themselves are drawn, in the color of the curve before, instead of a curve through them.
+    pub dots: bool,
 }
 
 /// Size as shown on a page.
@@ -57,20 +59,28 @@ impl Figure {
         p.0.is_finite() && p.1.is_finite() && (!self.log || p.1 > 0.0)
     }
 
+    /// Writes `<stem>.svg`.
+    pub fn write_svg(&self, stem: &Path) -> anyhow::Result<()> {
+        let svg = stem.with_extension("svg");
+        std::fs::write(&svg, self.svg()?).with_context(|| format!("cannot write {}", svg.display()))
+    }
+
     /// Writes `<stem>.png` and `<stem>.svg`.
     pub fn write(&self, stem: &Path) -> anyhow::Result<()> {
+        self.write_svg(stem)?;
+        let size = Size { width: SIZE.width * PNG_SCALE, height: SIZE.height * PNG_SCALE };
+        let mut image = Image { size, rgb: vec![255; (3 * size.width * size.height) as usize] };
+        overlay(&mut image, &self.svg()?, f64::from(PNG_SCALE))?;
+        image.write(&stem.with_extension("png"))
+    }
+
+    fn svg(&self) -> anyhow::Result<String> {
         fonts();
         let drawn = (SIZE.width * FINE, SIZE.height * FINE);
         let mut text = String::new();
         self.draw(&SVGBackend::with_string(&mut text, drawn).into_drawing_area())?;
         let head = |(width, height): (u32, u32)| format!("<svg width=\"{width}\" height=\"{height}\"");
-        let text = text.replacen(&head(drawn), &head((SIZE.width, SIZE.height)), 1);
-        let svg = stem.with_extension("svg");
-        std::fs::write(&svg, &text).with_context(|| format!("cannot write {}", svg.display()))?;
-        let size = Size { width: SIZE.width * PNG_SCALE, height: SIZE.height * PNG_SCALE };
-        let mut image = Image { size, rgb: vec![255; (3 * size.width * size.height) as usize] };
-        overlay(&mut image, &text, f64::from(PNG_SCALE))?;
-        image.write(&stem.with_extension("png"))
+        Ok(text.replacen(&head(drawn), &head((SIZE.width, SIZE.height)), 1))
     }
 
     fn draw(&self, area: &Area<'_>) -> anyhow::Result<()> {
@@ -158,8 +168,18 @@ impl Frame<'_> {
             let drawn = chart.draw_series(DashedLineSeries::new(points, 6 * FINE, 4 * FINE, style))?;
             drawn.label(name.clone()).legend(move |(lx, ly)| PathElement::new([(lx, ly), (lx + px(16), ly)], style));
         }
+        let mut color = 0;
         for (i, line) in figure.lines.iter().enumerate() {
-            let [r, g, b] = THREAD_COLORS[i % THREAD_COLORS.len()];
+            // Dots belong to the curve before them.
+            color += usize::from(i > 0 && !line.dots);
+            let [r, g, b] = THREAD_COLORS[color % THREAD_COLORS.len()];
+            if line.dots {
+                let dots =
+                    line.points.iter().filter(|p| figure.can_show(p)).map(|(x, y)| Circle::new((*x, y * factor), 5 * FINE / 2, RGBColor(r, g, b).filled()));
+                let drawn = chart.draw_series(dots)?;
+                drawn.label(line.name.clone()).legend(move |(lx, ly)| Circle::new((lx + px(8), ly), 5 * FINE / 2, RGBColor(r, g, b).filled()));
+                continue;
+            }
             let style = RGBColor(r, g, b).stroke_width(3 * FINE / 2);
             for (k, piece) in line.points.split(|p| !figure.can_show(p)).filter(|p| !p.is_empty()).enumerate() {
                 let points = thin(piece, x, SIZE.width as usize).into_iter().map(|(x, y)| (x, y * factor));

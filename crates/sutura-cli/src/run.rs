@@ -21,7 +21,7 @@ impl Run {
 
 /// Runs the command; false when a check failed.
 pub fn run(args: &Run) -> anyhow::Result<bool> {
-    let scene = load(&args.scene)?;
+    let scene = load(&args.scene, &args.settings)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(scene.name()));
     if !args.dry {
         // Before the work, so that a folder that cannot be written is found at once.
@@ -40,17 +40,17 @@ pub fn run(args: &Run) -> anyhow::Result<bool> {
     Ok(outcome.report.passed)
 }
 
-/// A scene file, or else a built-in scene of that name.
-pub fn load(scene: &str) -> anyhow::Result<Scene> {
+/// A scene file, or else a built-in scene of that name, with some of its values set from outside.
+pub fn load(scene: &str, settings: &[(String, String)]) -> anyhow::Result<Scene> {
     let path = Path::new(scene);
     if path.is_file() {
-        return Ok(Scene::load(path)?);
+        return Ok(Scene::load_with(path, settings)?);
     }
     if path.components().count() > 1 {
         anyhow::bail!("{scene}: there is no such file");
     }
     let sample = scenes::find(scene).with_context(|| format!("{scene}: there is no such file"))?;
-    Ok(Scene::parse(sample.text, &format!("{}.toml", sample.name))?)
+    Ok(Scene::parse_with(sample.text, &format!("{}.toml", sample.name), settings)?)
 }
 
 /// Steps to the end under a progress bar.
@@ -163,7 +163,7 @@ const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
 fn grouped(series: &Series) -> Vec<(String, Figure)> {
     let Some((x_name, x_unit)) = series.columns.first() else { return Vec::new() };
     let x: Vec<f64> = series.rows.iter().map(|r| r[0]).collect();
-    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect() };
+    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect(), dots: false };
     let figure = |title: &str, y: (&str, &str), log: bool, lines: Vec<Line>| Figure {
         title: title.into(),
         x: (x_name.clone(), x_unit.clone()),

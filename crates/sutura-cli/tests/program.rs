@@ -224,3 +224,37 @@ fn bench_measures_and_names_the_machine() {
     // Inextensible means to a thousandth of a percent.
     assert!(row["max_elongation"].as_f64() < Some(1e-5));
 }
+
+#[test]
+fn validation_lists_runs_and_writes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let list = sutura(folder.path(), &["validate", "--list"]);
+    assert!(list.status.success() && text(&list.stdout).contains("tip load k = 5"));
+    let out = sutura(folder.path(), &["validate", "tip load k = 1", "--out", "found"]);
+    assert!(out.status.success(), "{}{}", text(&out.stdout), text(&out.stderr));
+    assert!(text(&out.stdout).contains("quantities are within their bars"));
+    let table = std::fs::read_to_string(folder.path().join("found/validation.md")).expect("the tables are written");
+    assert!(table.contains("## 1. Cantilever") && table.contains("![Cantilever") && table.contains("0.301721"));
+    for file in ["elastica.svg", "results.csv", "results.json"] {
+        assert!(folder.path().join("found/validation").join(file).is_file(), "{file}");
+    }
+    let wrong = sutura(folder.path(), &["validate", "tipp"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("`tipp`") && text(&wrong.stderr).contains("--list"));
+}
+
+#[test]
+fn values_of_a_scene_can_be_set() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_swing(folder.path(), "1 mm");
+    let run = |settings: &[&str]| {
+        let args: Vec<&str> = ["run", "swing.toml", "--dry"].into_iter().chain(settings.iter().flat_map(|s| ["--set", s])).collect();
+        sutura(folder.path(), &args)
+    };
+    assert_eq!(run(&[]).status.code(), Some(0));
+    // Without weight it does not fall.
+    assert_eq!(run(&["solver.gravity=[0, 0, 0]"]).status.code(), Some(1));
+    let wrong = run(&["thread.thread.elments=5"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(text(&wrong.stderr).contains("thread.thread.elments = 5") && text(&wrong.stderr).contains("`elements`"), "{}", text(&wrong.stderr));
+}

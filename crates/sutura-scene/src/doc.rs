@@ -2,6 +2,7 @@
 //! at the first.
 
 use crate::error::{Problem, SceneError, suggest};
+use crate::set::Setting;
 use crate::units::{Dim, parse_quantity, parse_unit};
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -14,6 +15,8 @@ use toml::de::{DeTable, DeValue};
 pub struct Doc {
     file: String,
     text: String,
+    /// Values set from outside; their spans lie behind the text.
+    settings: Vec<Setting>,
     problems: RefCell<Vec<(usize, Problem)>>,
 }
 
@@ -21,14 +24,15 @@ pub struct Doc {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Location {
     pub file: String,
-    pub line: usize,
+    /// `None` for what was set from outside.
+    pub line: Option<usize>,
     pub key: String,
 }
 
 impl Location {
     /// A problem at this place.
     pub fn problem(&self, message: impl Into<String>) -> Problem {
-        Problem { file: self.file.clone(), line: Some(self.line), column: None, key: self.key.clone(), message: message.into(), help: None }
+        Problem { file: self.file.clone(), line: self.line, column: None, key: self.key.clone(), message: message.into(), help: None }
     }
     /// An error with one problem at this place.
     pub fn error(&self, message: impl Into<String>) -> SceneError {
@@ -37,11 +41,31 @@ impl Location {
 }
 
 impl Doc {
-    pub fn new(file: &str, text: &str) -> Self {
-        Doc { file: file.into(), text: text.into(), problems: RefCell::default() }
+    /// `settings` are paths and values from outside.
+    pub fn new(file: &str, text: &str, settings: &[(String, String)]) -> Self {
+        let mut end = text.len();
+        let setting = |(path, value): &(String, String)| {
+            let setting = Setting::new(path, value, end);
+            end = setting.end();
+            setting
+        };
+        Doc { file: file.into(), text: text.into(), settings: settings.iter().map(setting).collect(), problems: RefCell::default() }
     }
     pub fn text(&self) -> &str {
         &self.text
+    }
+    pub fn settings(&self) -> &[Setting] {
+        &self.settings
+    }
+    /// File, line and column of a byte; what was set from outside stands for itself.
+    fn place(&self, at: usize) -> (String, Option<usize>, Option<usize>) {
+        if at > self.text.len()
+            && let Some(setting) = self.settings.iter().find(|s| at <= s.end())
+        {
+            return (setting.source(), None, None);
+        }
+        let (line, column) = self.line_column(at);
+        (self.file.clone(), Some(line), Some(column))
     }
     /// Line and column, from 1, of a byte.
     fn line_column(&self, at: usize) -> (usize, usize) {
@@ -55,13 +79,15 @@ impl Doc {
     }
     /// Notes a problem at a byte.
     pub fn problem(&self, at: usize, key: &str, message: impl Into<String>, help: Option<String>) {
-        let (line, column) = self.line_column(at);
-        let problem = Problem { file: self.file.clone(), line: Some(line), column: Some(column), key: key.into(), message: message.into(), help };
+        let (file, line, column) = self.place(at);
+        let problem = Problem { file, line, column, key: key.into(), message: message.into(), help };
         self.problems.borrow_mut().push((at, problem));
     }
     /// Notes a problem at a place read before.
     pub fn problem_at(&self, location: &Location, message: impl Into<String>) {
-        let at = self.text.split_inclusive('\n').take(location.line.saturating_sub(1)).map(str::len).sum();
+        let lines = |n: usize| self.text.split_inclusive('\n').take(n).map(str::len).sum();
+        let set = || self.settings.iter().find(|s| s.source() == location.file).map_or(0, Setting::end);
+        let at = location.line.map_or_else(set, |line| lines(line.saturating_sub(1)));
         self.problem(at, &location.key, message, None);
     }
     /// `Ok` when nothing was wrong, else all problems in the order of the file, each place and message once.
@@ -130,7 +156,8 @@ impl<'d> Table<'d> {
         self.doc.problem(self.span.start, &self.path, message, help);
     }
     pub fn location(&self) -> Location {
-        Location { file: self.doc.file.clone(), line: self.doc.line_column(self.span.start).0, key: self.path.clone() }
+        let (file, line, _) = self.doc.place(self.span.start);
+        Location { file, line, key: self.path.clone() }
     }
     /// Reports every key that was never asked for, with the nearest that was.
     pub fn finish(&self) {
@@ -194,7 +221,8 @@ impl<'d> Value<'d> {
         None
     }
     pub fn location(&self) -> Location {
-        Location { file: self.doc.file.clone(), line: self.doc.line_column(self.span.start).0, key: self.path.clone() }
+        let (file, line, _) = self.doc.place(self.span.start);
+        Location { file, line, key: self.path.clone() }
     }
     pub fn is_text(&self) -> bool {
         matches!(self.node, DeValue::String(_))

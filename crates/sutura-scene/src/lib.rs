@@ -18,6 +18,7 @@ mod runner;
 mod samples;
 mod saved;
 mod scene;
+mod set;
 mod stage;
 mod trajectory;
 mod units;

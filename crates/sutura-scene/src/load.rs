@@ -24,15 +24,18 @@ use sutura::{
     transported_frames,
 };
 
-/// Reads a scene; every problem found is in the error.
-pub fn scene(text: &str, file_name: &str) -> Result<Scene, SceneError> {
-    let doc = Doc::new(file_name, text);
-    let (document, errors) = toml::de::DeTable::parse_recoverable(doc.text());
+/// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
+pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Result<Scene, SceneError> {
+    let doc = Doc::new(file_name, text, settings);
+    let (mut document, errors) = toml::de::DeTable::parse_recoverable(doc.text());
     for e in &errors {
         doc.problem(e.span().map_or(0, |s| s.start), "", e.message().trim(), None);
     }
     // After a slip in the syntax what was recovered would only give follow-up problems.
     doc.verdict()?;
+    for setting in doc.settings() {
+        setting.apply(&mut document)?;
+    }
     let root = Table::root(&doc, &document);
     let folder = Path::new(file_name).parent().map(Path::to_path_buf).unwrap_or_default();
     let mut loader = Loader {

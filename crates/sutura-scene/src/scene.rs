@@ -262,12 +262,21 @@ pub(crate) fn engine_place(at: At, length: f64) -> Place {
 impl Scene {
     /// Reads a scene file. Paths in it are relative to its folder.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
+        Self::load_with(path, &[])
+    }
+    /// The same with some of its values set from outside, see [`Scene::parse_with`].
+    pub fn load_with(path: &Path, settings: &[(String, String)]) -> Result<Scene, SceneError> {
         let text = std::fs::read_to_string(path).map_err(|e| SceneError::of_file(path.display().to_string(), e.to_string()))?;
-        Self::parse(&text, &path.display().to_string())
+        Self::parse_with(&text, &path.display().to_string(), settings)
     }
     /// Reads the text of a scene; `file_name` stands in messages, and its folder is where paths start.
     pub fn parse(text: &str, file_name: &str) -> Result<Scene, SceneError> {
-        crate::load::scene(text, file_name)
+        Self::parse_with(text, file_name, &[])
+    }
+    /// The same with some of its values set from outside, in order: the path of a key (`solver.substep`, `thread.NAME.elements`,
+    /// `phase.NAME.action[0].force`) and its value, which is read as TOML and, where it is none (`2 mm`), as a text.
+    pub fn parse_with(text: &str, file_name: &str, settings: &[(String, String)]) -> Result<Scene, SceneError> {
+        crate::load::scene(text, file_name, settings)
     }
     /// Name: the file name without its ending.
     pub fn name(&self) -> &str {

@@ -1,0 +1,101 @@
+//! Frames: bending and twist together, roll of a clamp, rotation of the whole scene.
+
+use super::{ELEMENTS, vector};
+use crate::reference::kirchhoff::{Cantilever, Station};
+use crate::reference::material::T1;
+use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, last};
+
+const LENGTH: f64 = 0.05;
+
+pub fn section() -> Section {
+    let mut section = Section::new(
+        17,
+        "Frames",
+        "A cantilever of 50 mm of 2-0 monofilament along x, 1 mN along -y at its tip and a dead torque of 2e-5 N m about x there, against the Kirchhoff rod \
+         by shooting; the opposite torque mirrors z. What a round, naturally straight rod does depends neither on the roll of its clamp nor on \
+         how the whole scene is turned.",
+    );
+    section.studies.push(twisted(2e-5));
+    section.studies.push(twisted(-2e-5));
+    section.studies.push(roll());
+    section.studies.push(turned());
+    section.left_out = &[LeftOut { what: "sections with two bending stiffnesses, rolled and pre-twisted", why: "sections are round" }];
+    section
+}
+
+fn exact(moment: f64) -> Station {
+    Cantilever {
+        start: [0.0; 3],
+        frame: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+        length: LENGTH,
+        stiffness: [T1.ei(), T1.gj()],
+        rest: [0.0; 3],
+        force: [0.0, -1e-3, 0.0],
+        moment: [moment, 0.0, 0.0],
+    }
+    .tip()
+}
+
+fn load(force: [f64; 3], torque: [f64; 3]) -> String {
+    format!("{{ load = \"tip\", at = \"end\", force = {}, torque = {}, ramp = \"2 s\" }}", vector(force), vector(torque))
+}
+
+fn twisted(moment: f64) -> Study {
+    let tip = exact(moment);
+    let mut study = Study::new(format!("tip torque {moment:e} N m"), "cantilever")
+        .set("phase.load.action[0]", load([0.0, -1e-3, 0.0], [moment, 0.0, 0.0]))
+        .elements("rod", &ELEMENTS)
+        .quick(moment > 0.0);
+    for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
+        let name = format!("{} / L", probe.replace('.', " "));
+        study = study.quantity(Quantity::last(name, probe, 1.0 / LENGTH, tip.position[i] / LENGTH, "shooting", Bar::Order(0.01, 1.8)));
+    }
+    for (i, probe) in ["d1.x", "d1.y", "d1.z"].into_iter().enumerate() {
+        let name = probe.replace('.', " at the tip, ");
+        let reason = "read in the last element, half an element from the tip, where a torque of first order in the element acts";
+        study = study.quantity(Quantity::last(name, probe, 1.0, tip.frame[0][i], "shooting", Bar::Order(0.01, 0.9)).scale(1.0).because(reason));
+    }
+    study
+}
+
+/// The clamp rolled about the rod.
+fn roll() -> Study {
+    let level = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Level::new(format!("{degrees} degrees"), 0.0, &[("thread.rod.d1", vector([0.0, cos, sin]))])
+    };
+    let mut study = Study::new("roll of the clamp", "cantilever")
+        .set("phase.load.action[0]", load([0.0, -1e-3, 0.5e-3], [0.0; 3]))
+        .levels([0.0, 30.0, 45.0, 90.0].map(level).into());
+    for probe in ["tip.x", "tip.y", "tip.z"] {
+        let name = format!("{} / L", probe.replace('.', " "));
+        study = study.quantity(Quantity::measured(name, move |o| last(o, probe) / LENGTH, Vec::new(), "each other", Bar::Same(1e-6)).scale(1.0));
+    }
+    study
+}
+
+/// The whole scene turned: the rod along another direction, the load turned with it. The deflection along the load is the same.
+fn turned() -> Study {
+    // Columns of a rotation: where x, y, z go.
+    let level = |name: &str, axes: [[f64; 3]; 3]| {
+        let along = axes[0].map(|c| c * LENGTH);
+        let force = axes[2].map(|c| -1e-3 * c);
+        Level::new(name, 0.0, &[("thread.rod.line.to", vector(along)), ("thread.rod.d1", vector(axes[1])), ("phase.load.action[0]", load(force, [0.0; 3]))])
+    };
+    let (s, c) = 0.7_f64.sin_cos();
+    let (u, v) = 1.1_f64.sin_cos();
+    let levels = vec![
+        level("as it is", [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        level("x to z", [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        level("x to -x", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
+        level("oblique", [[c * v, s, -c * u], [-s * v, c, s * u], [u, 0.0, v]]),
+    ];
+    let size = |o: &sutura_scene::Outcome| ["tip.x", "tip.y", "tip.z"].map(|p| last(o, p)).iter().map(|v| v * v).sum::<f64>().sqrt() / LENGTH;
+    Study::new("whole scene turned", "cantilever").levels(levels).quantity(Quantity::measured(
+        "distance of the tip from the clamp / L",
+        size,
+        Vec::new(),
+        "each other",
+        Bar::Same(1e-9),
+    ))
+}

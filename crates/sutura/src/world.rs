@@ -83,6 +83,7 @@ impl World {
             radius: low.radius,
             material: spec.material.clone(),
             stretch: spec.stretch,
+            flat: low.flat,
             surface: spec.surface,
             contact_stiffness: crate::params::CONTACT_STIFFNESS * spec.material.young_modulus * low.radius,
         };

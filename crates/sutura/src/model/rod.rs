@@ -132,6 +132,8 @@ pub(crate) struct RodModel {
     pub radius: f64,
     pub material: Material,
     pub stretch: Stretch,
+    /// Whether it bends more easily one way than the other.
+    pub flat: bool,
     pub surface: u32,
     /// Radius-scaled normal stiffness of its surface \[N/m\].
     pub contact_stiffness: f64,
@@ -154,6 +156,8 @@ pub(crate) struct Lowered {
     pub frames: Vec<DQuat>,
     /// Of each element.
     pub sections: Vec<SectionStiffness>,
+    /// Whether any bends more easily one way than the other.
+    pub flat: bool,
     /// With which it touches \[m\].
     pub radius: f64,
 }
@@ -263,9 +267,10 @@ impl RodSpec {
             let stiffness = (section.ea + section.bend.max_element()) / l;
             check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
         }
-        if self.material.plasticity.is_some() && sections.iter().any(|s| s.bend.x != s.bend.y) {
+        let flat = sections.iter().any(|s| s.bend.x != s.bend.y);
+        if self.material.plasticity.is_some() && flat {
             return Err(Error::invalid(what, "material.plasticity", self.section, "no plasticity for a section that is stiffer one way than the other"));
         }
-        Ok(Lowered { rest_lengths, rest_half, frames, sections, radius: self.radius * self.along.size.largest() })
+        Ok(Lowered { rest_lengths, rest_half, frames, sections, flat, radius: self.radius * self.along.size.largest() })
     }
 }

@@ -108,7 +108,7 @@ impl Drawn {
     fn of(s: &Session, rod: sutura::Handle<sutura::Rod>) -> Result<Drawn, sutura::Error> {
         let view = s.world.rod(rod)?;
         let x = view.positions();
-        Ok(Drawn { tension: view.max_tension(), ea: view.axial_stiffness(), span: x[0].distance(x[x.len() - 1]) })
+        Ok(Drawn { tension: view.max_tension(), ea: view.axial_stiffness(0), span: x[0].distance(x[x.len() - 1]) })
     }
 
     /// Why the draw ends here.

@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3, EulerRot};
 use sutura::math::{exp, frame_from_tangent, log};
 use sutura::{
-    Friction, Geometry, Hold, Material, Place, Plasticity, Pose, RestShape, RodSpec, Settings, ShapeMotion, ShapeSpec, Shear, Stretch, transported_frames,
+    Along, Friction, Geometry, Hold, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Stretch,
+    transported_frames,
 };
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.

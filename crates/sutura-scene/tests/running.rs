@@ -225,3 +225,85 @@ tolerance = "1 um"
     ));
     assert!(out.report.passed, "{:#?}", out.report.checks);
 }
+
+/// Two clamped tapes side by side, one on its edge, and a tapered thread: closed forms of `crates/sutura/tests/sections.rs` through a scene.
+#[test]
+fn sections_and_tables_along_the_thread_reach_the_engine() {
+    let out = run(r#"
+frame_rate = 10
+[solver]
+gravity = [0, 0, 0]
+[[thread]]
+name = "flat"
+section = { rectangle = ["1 mm", "0.5 mm"] }
+d1 = [0, 1, 0]
+young_modulus = "2 GPa"
+density = "1150 kg/m^3"
+elements = 40
+line = { from = [0, 0, 0], to = "[50, 0, 0] mm" }
+[[thread]]
+name = "edge"
+section = { rectangle = ["1 mm", "0.5 mm"] }
+roll = "90 deg"
+d1 = [0, 1, 0]
+young_modulus = "2 GPa"
+density = "1150 kg/m^3"
+elements = 40
+line = { from = "[0, 10, 0] mm", to = "[50, 10, 0] mm" }
+[[thread]]
+name = "cone"
+diameter = [["0 mm", "1 mm"], ["50 mm", "0.5 mm"]]
+young_modulus = "2 GPa"
+density = "1150 kg/m^3"
+elements = 40
+line = { from = "[0, 20, 0] mm", to = "[50, 20, 0] mm" }
+[[grip]]
+name = "a"
+thread = "flat"
+at = "start"
+hold = "clamp"
+[[grip]]
+name = "b"
+thread = "edge"
+at = "start"
+hold = "clamp"
+[[grip]]
+name = "c"
+thread = "cone"
+at = "start"
+hold = "clamp"
+[[load]]
+name = "on_flat"
+thread = "flat"
+at = "end"
+force = "[0, 0, 10] uN"
+[[load]]
+name = "on_edge"
+thread = "edge"
+at = "end"
+force = "[0, 0, 10] uN"
+[[load]]
+name = "on_cone"
+thread = "cone"
+at = "end"
+force = "[0, 0, 10] uN"
+[[phase]]
+duration = "3 s"
+[[check]]
+that = "position(flat.end).z"
+equals = "20 um"
+tolerance = "1 %"
+[[check]]
+that = "position(edge.end).z"
+equals = "5 um"
+tolerance = "1 %"
+[[check]]
+that = "position(cone.end).z"
+equals = "8.488 um"
+tolerance = "1 %"
+"#);
+    let report = out.report;
+    assert!(report.passed, "{:?}", report.checks);
+    let radii: Vec<f64> = report.threads.iter().map(|t| t.radius_m).collect();
+    assert_eq!(radii, [0.5e-3; 3]);
+}

@@ -261,7 +261,8 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
             if e > rod.start {
                 let before = step[2 * e - 1];
                 out += before.dot(scratch.moment[e].cross(turn));
-                kept += model.bend_stiffness[e].x * (turn - before).length_squared();
+                let stiffness = model.bend_stiffness[e];
+                kept += stiffness.x.min(stiffness.y) * (turn - before).length_squared();
             }
         }
     }

@@ -229,7 +229,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                 if i > first && i < first + rod.n_elements as usize {
                     scratch.joint_on[i] = false;
                 }
-                let stiffness = |e: usize| DVec3::new(rod.section.ei, rod.section.ei, rod.section.gj) / (0.5 * model.rest_length[e]);
+                let stiffness = |e: usize| model.section[e].bend / (0.5 * model.rest_length[e]);
                 let sides = [(i > first).then(|| (i - 1, false)), (i < first + rod.n_elements as usize).then_some((i, true))];
                 for (e, before) in sides.into_iter().flatten() {
                     let q = scratch.start_frame[e];

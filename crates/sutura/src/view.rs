@@ -2,6 +2,7 @@
 
 use crate::math::{Pose, log};
 use crate::model::Model;
+use crate::model::material::SectionStiffness;
 use crate::model::rod::RodModel;
 use crate::model::shape::Geometry;
 use crate::state::State;
@@ -112,17 +113,24 @@ impl<'a> RodView<'a> {
     pub fn n_elements(&self) -> usize {
         self.rod.n_elements as usize
     }
-    /// Radius \[m\].
+    /// Radius with which it touches \[m\].
     pub fn radius(&self) -> f64 {
         self.rod.radius
     }
-    /// Axial stiffness E A \[N\].
-    pub fn axial_stiffness(&self) -> f64 {
-        self.rod.section.ea
+    /// Axial stiffness E A of an element \[N\].
+    pub fn axial_stiffness(&self, element: usize) -> f64 {
+        self.section(element).ea
     }
-    /// Bending stiffness E I and twisting stiffness G J, bending scale included \[N m^2\].
-    pub fn bending_stiffness(&self) -> (f64, f64) {
-        (self.rod.section.ei, self.rod.section.gj)
+    /// Bending stiffness E I about d1 and d2 and twisting stiffness G J of an element, bending scale included \[N m^2\].
+    pub fn bending_stiffness(&self, element: usize) -> DVec3 {
+        self.section(element).bend
+    }
+    /// Mass per rest length of an element, without what is attached \[kg/m\].
+    pub fn mass_per_length(&self, element: usize) -> f64 {
+        self.section(element).mass
+    }
+    fn section(&self, element: usize) -> &SectionStiffness {
+        &self.model.section[self.rod.elements()][element]
     }
     /// Particle positions \[m\], n + 1.
     pub fn positions(&self) -> &'a [DVec3] {
@@ -167,8 +175,8 @@ impl<'a> RodView<'a> {
     }
     /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\]. Damping is not part of it.
     pub fn moment(&self, joint: usize) -> DVec3 {
-        let s = self.strain(joint);
-        DVec3::new(s.x * self.rod.section.ei, s.y * self.rod.section.ei, s.z * self.rod.section.gj)
+        let f = self.rod.first as usize + joint + 1;
+        crate::rod::joint_angle(self.model, self.state, f) * self.model.bend_stiffness[f]
     }
     /// Largest |length - rest length| / rest length of an element.
     pub fn max_elongation(&self) -> f64 {

@@ -6,7 +6,7 @@ use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
-use crate::model::{Model, ShapeModel, material::Section};
+use crate::model::{Model, ShapeModel};
 use crate::params::{Friction, Settings};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
@@ -75,18 +75,17 @@ impl World {
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
         let low = spec.lower()?;
         let n = low.rest_lengths.len();
-        let section = Section::round(&spec.material, spec.radius);
         let (model, state) = (&mut self.model, &mut self.state);
         let first = model.mass.len();
         let rod = RodModel {
             first: first as u32,
             n_elements: n as u32,
-            radius: spec.radius,
-            section,
+            radius: low.radius,
             material: spec.material.clone(),
             stretch: spec.stretch,
+            flat: low.flat,
             surface: spec.surface,
-            contact_stiffness: crate::params::CONTACT_STIFFNESS * spec.material.young_modulus * spec.radius,
+            contact_stiffness: crate::params::CONTACT_STIFFNESS * spec.material.young_modulus * low.radius,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
         for e in 0..=n {
@@ -96,13 +95,13 @@ impl World {
             model.inertia.push(DVec3::ZERO);
             model.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
-            let l = if e < n { after } else { before };
+            let (l, section) = if e < n { (after, low.sections[e]) } else { (before, low.sections[n - 1]) };
+            model.section.push(section);
             let penalty = if spec.stretch == Stretch::Inextensible { INEXTENSIBLE_PENALTY } else { 1.0 };
             model.stretch_stiffness.push(DVec3::new(section.kga, section.kga, penalty * section.ea) / l);
             let joint = if e > 0 && e < n { 0.5 * (before + after) } else { 0.0 };
             model.joint_length.push(joint);
-            let lbar = if joint > 0.0 { joint } else { l };
-            model.bend_stiffness.push(DVec3::new(section.ei, section.ei, section.gj) / lbar);
+            model.bend_stiffness.push(if joint > 0.0 { joined(low.sections[e - 1].bend, before, section.bend, after) } else { section.bend / l });
             model.bend_damping.push(spec.material.bend_damping);
             model.rest_half.push(if e < n { low.rest_half[e] } else { DQuat::IDENTITY });
             state.position.push(spec.centerline[e]);
@@ -134,6 +133,7 @@ impl World {
         drain!(
             model.rod_of,
             model.mass,
+            model.section,
             model.inertia,
             model.rest_length,
             model.inextensible,
@@ -363,11 +363,11 @@ impl World {
         for (_, rod) in model.rods.iter() {
             for e in rod.elements() {
                 let l = model.rest_length[e];
-                let half = 0.5 * rod.section.mass * l;
+                let section = model.section[e];
+                let half = 0.5 * section.mass * l;
                 model.mass[e] += half;
                 model.mass[e + 1] += half;
-                let i = rod.section.inertia * l;
-                model.inertia[e] = DVec3::new(i, i, 2.0 * i);
+                model.inertia[e] = section.inertia * l;
             }
         }
         for (_, load) in self.state.loads.iter() {
@@ -492,7 +492,7 @@ impl World {
         for (_, rod) in self.model.rods.iter() {
             for e in rod.elements() {
                 let strain = (self.state.position[e + 1] - self.state.position[e]).length() / self.model.rest_length[e] - 1.0;
-                let want = if self.model.inextensible[e] { 0.0 } else { self.state.tension[e] / rod.section.ea };
+                let want = if self.model.inextensible[e] { 0.0 } else { self.state.tension[e] / self.model.section[e].ea };
                 worst = worst.max((strain - want).abs());
             }
         }
@@ -586,6 +586,11 @@ impl World {
     pub fn forget_scratch(&mut self) {
         self.scratch = Scratch::default();
     }
+}
+
+/// Stiffness of a joint: half an element of bending stiffness `a` and length `la` in series with half of the next.
+fn joined(a: DVec3, la: f64, b: DVec3, lb: f64) -> DVec3 {
+    if a == b { a / (0.5 * (la + lb)) } else { (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip() }
 }
 
 /// Whether a grip and a new hold at `index` share a particle.

@@ -9,7 +9,7 @@ impl<'d> Loader<'d> {
     pub(super) fn thread(&mut self, table: &Table<'d>) {
         let index = self.threads.len();
         let name = table.need("name", "the name of the thread").and_then(|v| v.text()).map_or(format!("thread{index}"), std::borrow::Cow::into_owned);
-        let radius = self.thickness(table);
+        let shape = self.cross_section(table);
         let material = self.material(table);
         let stretch = table.get("stretch").and_then(|v| v.choice(&[("elastic", Stretch::Elastic), ("inextensible", Stretch::Inextensible)]));
         let surface = self.surface(table, 0);
@@ -17,8 +17,9 @@ impl<'d> Loader<'d> {
         let points = self.centerline(table, None);
         let hint = table.vector("d1", Dim::NUMBER);
         let twist = table.quantity_or("twist", Dim::ANGLE, 0.0);
+        let (roll, pretwist) = (table.quantity_or("roll", Dim::ANGLE, 0.0), table.quantity_or("pretwist", Dim::ANGLE, 0.0));
         let rest_value = table.get("rest");
-        let (Some(points), Some(radius), Some(material)) = (points, radius, material) else {
+        let (Some(points), Some((section, radius, size)), Some((material, modulus, density))) = (points, shape, material) else {
             // What is missing was reported; a stand-in keeps the numbers of the following threads right.
             if let Some(rest) = rest_value {
                 let _ = self.rest(&rest, 1);
@@ -27,7 +28,7 @@ impl<'d> Loader<'d> {
             self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
             return;
         };
-        let mut spec = RodSpec::new(points, radius, material);
+        let mut spec = RodSpec { section, roll, pretwist, along: Along { size, modulus, density }, ..RodSpec::new(points, radius, material) };
         spec.stretch = stretch.unwrap_or(Stretch::Elastic);
         spec.surface = surface;
         if let Some(rest) = rest_value {
@@ -39,7 +40,9 @@ impl<'d> Loader<'d> {
         self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
     }
 
-    pub(super) fn thickness(&self, table: &Table<'d>) -> Option<f64> {
+    /// Section, radius with which it touches, and the size of the section along the thread over its largest.
+    pub(super) fn cross_section(&self, table: &Table<'d>) -> Option<(Section, f64, Profile)> {
+        let section = table.get("section").map(|v| section(&v));
         let preset = table.get("size").and_then(|v| match presets::find_size(&v.text()?) {
             Ok(size) => Some(0.5 * size.diameter.value),
             Err(e) => {
@@ -47,16 +50,38 @@ impl<'d> Loader<'d> {
                 None
             }
         });
-        let radius = positive(table, "radius", Dim::LENGTH);
-        let diameter = positive(table, "diameter", Dim::LENGTH).map(|d| 0.5 * d);
-        let found = radius.or(diameter).or(preset);
-        if found.is_none() && !["size", "radius", "diameter"].iter().any(|k| table.has(k)) {
-            table.problem("`size`, `diameter` or `radius` is missing", None);
+        let radius = along(table, "radius", Dim::LENGTH);
+        let diameter = along(table, "diameter", Dim::LENGTH).map(|(d, profile)| (0.5 * d, profile));
+        let scale = match table.get("section_scale") {
+            Some(v) => along_value(&v, Dim::NUMBER).map(|scale| (scale, Some(v))),
+            None => Some(((1.0, Profile::default()), None)),
+        };
+        let said = ["size", "radius", "diameter"].iter().any(|k| table.has(k));
+        let ((largest, scale), scaled) = scale?;
+        // What was given and wrong is reported already.
+        let section = section.map_or(Some(Section::Round), |s| s)?.scaled(largest);
+        if said {
+            let (radius, profile) = radius.or(diameter).or(preset.map(|r| (r, Profile::default())))?;
+            let varies = profile != Profile::default();
+            if let (true, Some(value)) = (varies, &scaled) {
+                value.problem("`section_scale` and a radius along the thread exclude each other", None);
+            } else if varies && section != Section::Round {
+                let value = table.get("radius").or(table.get("diameter"))?;
+                value.problem("a section that is not round touches with one radius", Some("`section_scale` changes its size along the thread".into()));
+            }
+            let radius = if section == Section::Round { radius * largest } else { radius };
+            Some((section, radius, if varies { profile } else { scale }))
+        } else {
+            let half = section.half_width();
+            if half.is_none() {
+                table.problem("`size`, `diameter` or `radius` is missing", None);
+            }
+            Some((section, half?, scale))
         }
-        found
     }
 
-    pub(super) fn material(&self, table: &Table<'d>) -> Option<Material> {
+    /// Material with the largest modulus and density along the thread, and both over these.
+    pub(super) fn material(&self, table: &Table<'d>) -> Option<(Material, Profile, Profile)> {
         let mut failed = false;
         let preset = table.get("material").and_then(|v| match presets::find_material(&v.text()?) {
             Ok(m) => Some(m),
@@ -66,8 +91,8 @@ impl<'d> Loader<'d> {
                 None
             }
         });
-        let e = positive(table, "young_modulus", Dim::PRESSURE).or(preset.map(|p| p.young_modulus.value));
-        let density = positive(table, "density", Dim::DENSITY).or(preset.map(|p| p.density.value));
+        let e = along(table, "young_modulus", Dim::PRESSURE).or(preset.map(|p| (p.young_modulus.value, Profile::default())));
+        let density = along(table, "density", Dim::DENSITY).or(preset.map(|p| (p.density.value, Profile::default())));
         let nu = in_range(table, "poisson_ratio", Dim::NUMBER, -0.999_999, 0.5);
         let g = positive(table, "shear_modulus", Dim::PRESSURE);
         if nu.is_some() && g.is_some() {
@@ -84,7 +109,7 @@ impl<'d> Loader<'d> {
             let yield_curvature = yield_curvature?;
             Some(Plasticity { yield_curvature, yield_twist: yield_twist.unwrap_or(yield_curvature), hardening })
         });
-        let (Some(young_modulus), Some(density)) = (e, density) else {
+        let (Some((young_modulus, modulus_along)), Some((density, density_along))) = (e, density) else {
             if !failed && !table.has("young_modulus") {
                 table.problem("`material` or `young_modulus` is missing", Some(format!("materials: {}", names_of_materials())));
             } else if !failed && !table.has("density") {
@@ -97,7 +122,7 @@ impl<'d> Loader<'d> {
             (None, Some(nu)) => Shear::Poisson(nu),
             (None, None) => Shear::Poisson(preset.map_or(0.4, |p| p.poisson_ratio.value)),
         };
-        Some(Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity })
+        Some((Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity }, modulus_along, density_along))
     }
 
     /// The particles of a thread (or of a rest shape with a given number of elements).
@@ -337,6 +362,66 @@ impl<'d> Loader<'d> {
             }
         }
     }
+}
+
+/// `{ ellipse = [a, b] }` or `{ rectangle = [a, b] }`.
+fn section(value: &Value<'_>) -> Option<Section> {
+    if value.is_text() {
+        return value.choice(&[("round", Section::Round)]);
+    }
+    let t = value.table()?;
+    let lengths = |v: &Value<'_>| {
+        let found = v.quantities(Dim::LENGTH, "two lengths, along d1 and d2")?;
+        match found.as_slice() {
+            [a, b] if *a > 0.0 && *b > 0.0 => Some([*a, *b]),
+            _ => {
+                v.problem("wanted two lengths > 0, along d1 and d2", None);
+                None
+            }
+        }
+    };
+    let found = match (t.get("ellipse"), t.get("rectangle")) {
+        (Some(v), None) => lengths(&v).map(Section::Ellipse),
+        (None, Some(v)) => lengths(&v).map(Section::Rectangle),
+        _ => {
+            t.problem("either `ellipse`, its semi-axes, or `rectangle`, its sides", None);
+            None
+        }
+    };
+    t.finish();
+    found
+}
+
+/// A quantity > 0, or one along the thread: the largest value and the profile over it.
+fn along(table: &Table<'_>, key: &str, dim: Dim) -> Option<(f64, Profile)> {
+    along_value(&table.get(key)?, dim)
+}
+
+fn along_value(value: &Value<'_>, dim: Dim) -> Option<(f64, Profile)> {
+    if !value.is_array() {
+        return positive_value(value, dim).map(|v| (v, Profile::default()));
+    }
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for pair in value.array("an array of pairs")? {
+        let wanted = "a pair: rest length from the start, and the value there";
+        let items = pair.array(wanted)?;
+        let [arc, there] = items.as_slice() else {
+            pair.problem(format!("wanted {wanted}"), None);
+            return None;
+        };
+        let (s, v) = (arc.quantity(Dim::LENGTH)?, positive_value(there, dim)?);
+        if points.last().is_some_and(|(before, _)| s <= *before) {
+            arc.problem("lengths from the start must grow from pair to pair", None);
+            return None;
+        }
+        points.push((s, v));
+    }
+    let Some(largest) = points.iter().map(|(_, v)| *v).reduce(f64::max) else {
+        value.problem("at least one pair is wanted: rest length from the start, and the value there", None);
+        return None;
+    };
+    points.iter_mut().for_each(|(_, v)| *v /= largest);
+    Some((largest, Profile(points)))
 }
 
 fn names_of_materials() -> String {

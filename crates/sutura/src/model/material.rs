@@ -1,8 +1,10 @@
 //! Moduli to compliance and mass. The only place where a Young's modulus becomes a stiffness.
 
 use crate::error::{Error, check};
+use crate::model::section::{Along, Section};
+use glam::DVec3;
 
-/// What a thread is made of and how thick it is.
+/// What a thread is made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     /// Young's modulus E in tension \[Pa\], > 0.
@@ -73,38 +75,36 @@ impl Material {
     }
 }
 
-/// Stiffness and mass per length of a round rod. Lengths divide or multiply these, nothing else does.
+/// Stiffness and mass per length of a rod at one place. Lengths divide or multiply these, nothing else does.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Section {
+pub struct SectionStiffness {
     /// Axial stiffness E A \[N\].
     pub ea: f64,
-    /// Shear stiffness k G A \[N\], k = 6 (1 + nu) / (7 + 6 nu) for a round section (Cowper 1966).
+    /// Shear stiffness k G A, the same in both directions \[N\].
     pub kga: f64,
-    /// Bending stiffness E I about any diameter, times the bending scale \[N m^2\].
-    pub ei: f64,
-    /// Twisting stiffness G J, times the bending scale \[N m^2\].
-    pub gj: f64,
+    /// Bending stiffness E I about d1 and d2 and twisting stiffness G J, times the bending scale \[N m^2\].
+    pub bend: DVec3,
     /// Mass per length \[kg/m\].
     pub mass: f64,
-    /// Moment of inertia per length about a diameter, rho I \[kg m\]; about the axis it is twice that.
-    pub inertia: f64,
+    /// Moments of inertia per length about d1, d2 and d3, rho I \[kg m\].
+    pub inertia: DVec3,
 }
 
-impl Section {
-    /// Stiffness and mass of a round rod of radius `r` \[m\].
-    pub fn round(material: &Material, r: f64) -> Self {
-        let (e, g) = (material.young_modulus, material.shear_modulus());
-        let area = core::f64::consts::PI * r * r;
-        let i = 0.25 * area * r * r;
+impl SectionStiffness {
+    /// At rest arc length `s` \[m\] of a rod; `radius` \[m\] is that of a round section of size 1.
+    pub fn new(material: &Material, section: &Section, radius: f64, along: &Along, s: f64) -> Self {
+        let of = section.areas(radius, along.size.at(s));
+        let stiff = along.modulus.at(s);
+        let (e, g) = (material.young_modulus * stiff, material.shear_modulus() * stiff);
+        let density = material.density * along.density.at(s);
         let nu = (e / (2.0 * g) - 1.0).clamp(0.0, 0.5);
-        let k = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
-        Section {
-            ea: e * area,
-            kga: k * g * area,
-            ei: e * i * material.bend_scale,
-            gj: g * 2.0 * i * material.bend_scale,
-            mass: material.density * area,
-            inertia: material.density * i,
+        let [i1, i2] = of.about;
+        SectionStiffness {
+            ea: e * of.area,
+            kga: section.shear_factor(nu) * g * of.area,
+            bend: DVec3::new(e * i1, e * i2, g * of.torsion) * material.bend_scale,
+            mass: density * of.area,
+            inertia: DVec3::new(density * i1, density * i2, density * i1 + density * i2),
         }
     }
 }
@@ -116,8 +116,8 @@ mod tests {
     #[test]
     fn section_of_the_2_0_monofilament() {
         // Reference set T1: d = 0.30 mm, E = 2 GPa, nu = 0.4, rho = 1150.
-        let s = Section::round(&Material::elastic(2.0e9, 1150.0), 0.15e-3);
-        for (got, want) in [(s.ea, 141.372), (s.ei, 7.95216e-7), (s.gj, 5.68011e-7), (s.mass, 8.12887e-5)] {
+        let s = SectionStiffness::new(&Material::elastic(2.0e9, 1150.0), &Section::Round, 0.15e-3, &Along::default(), 0.0);
+        for (got, want) in [(s.ea, 141.372), (s.bend.x, 7.95216e-7), (s.bend.y, s.bend.x), (s.bend.z, 5.68011e-7), (s.mass, 8.12887e-5)] {
             assert!((got / want - 1.0).abs() < 1e-5, "{got} {want}");
         }
     }

@@ -3,11 +3,13 @@
 pub mod grip;
 pub mod material;
 pub mod rod;
+pub mod section;
 pub mod shape;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
 use glam::{DQuat, DVec3};
+use material::SectionStiffness;
 use rod::RodModel;
 use shape::{Geometry, ShapeMotion};
 
@@ -28,6 +30,8 @@ pub struct Model {
 
     /// Rest length of each element \[m\].
     pub(crate) rest_length: Vec<f64>,
+    /// Stiffness and mass per length of each element.
+    pub(crate) section: Vec<SectionStiffness>,
     /// Moments of inertia of each frame along its directors, attached ones included \[kg m^2\].
     pub(crate) inertia: Vec<DVec3>,
     /// Rest length between the middles of elements `e - 1` and `e` \[m\]; zero at the first element of a rod (no joint).

@@ -1,8 +1,9 @@
 //! What a user says of a thread, and the checked, lowered form that the solver reads.
 
 use crate::error::{Error, check};
-use crate::math::{frame_from_tangent, rotation_arc};
-use crate::model::material::{Material, Section};
+use crate::math::{exp, frame_from_tangent, half, rotation_arc};
+use crate::model::material::{Material, SectionStiffness};
+use crate::model::section::{Along, Section};
 use glam::{DQuat, DVec3};
 
 /// A thread. Marker of [`Handle`](crate::Handle).
@@ -19,8 +20,16 @@ pub struct RodSpec {
     pub frames: Option<Vec<DQuat>>,
     /// Shape that the thread has when nothing acts on it.
     pub rest: RestShape,
-    /// Radius \[m\], > 0.
+    /// Radius with which it touches, and of a round section \[m\], > 0.
     pub radius: f64,
+    /// Shape of the cross-section.
+    pub section: Section,
+    /// Angle by which the section is turned about the tangent, from `frames` and the rest shape \[rad\].
+    pub roll: f64,
+    /// The same, growing from zero at the start to this at the end, evenly along the rest length \[rad\]: twist without moment.
+    pub pretwist: f64,
+    /// How size, stiffness and density change along it.
+    pub along: Along,
     /// What it is made of.
     pub material: Material,
     /// Whether the centerline may stretch.
@@ -57,7 +66,19 @@ pub enum Stretch {
 impl RodSpec {
     /// An elastic, straight-rest thread through `centerline`.
     pub fn new(centerline: Vec<DVec3>, radius: f64, material: Material) -> Self {
-        RodSpec { centerline, frames: None, rest: RestShape::Straight, radius, material, stretch: Stretch::Elastic, surface: 0 }
+        RodSpec {
+            centerline,
+            frames: None,
+            rest: RestShape::Straight,
+            radius,
+            section: Section::Round,
+            roll: 0.0,
+            pretwist: 0.0,
+            along: Along::default(),
+            material,
+            stretch: Stretch::Elastic,
+            surface: 0,
+        }
     }
 
     /// `n_elements` equal elements from `from` to `to`.
@@ -107,10 +128,12 @@ pub(crate) struct RodModel {
     /// Index of the first particle and element in the world's arrays.
     pub first: u32,
     pub n_elements: u32,
+    /// With which it touches \[m\].
     pub radius: f64,
-    pub section: Section,
     pub material: Material,
     pub stretch: Stretch,
+    /// Whether it bends more easily one way than the other.
+    pub flat: bool,
     pub surface: u32,
     /// Radius-scaled normal stiffness of its surface \[N/m\].
     pub contact_stiffness: f64,
@@ -131,6 +154,12 @@ pub(crate) struct Lowered {
     /// Square root of the rest rotation of each joint; entry j is between frames j-1 and j (entry 0 unused, identity).
     pub rest_half: Vec<DQuat>,
     pub frames: Vec<DQuat>,
+    /// Of each element.
+    pub sections: Vec<SectionStiffness>,
+    /// Whether any bends more easily one way than the other.
+    pub flat: bool,
+    /// With which it touches \[m\].
+    pub radius: f64,
 }
 
 impl RodSpec {
@@ -138,6 +167,10 @@ impl RodSpec {
         let what = "rod";
         self.material.validate()?;
         check(what, "radius", self.radius, self.radius > 0.0, "a finite length > 0 [m]")?;
+        self.section.validate()?;
+        self.along.validate()?;
+        check(what, "roll", self.roll, true, "a finite angle [rad]")?;
+        check(what, "pretwist", self.pretwist, true, "a finite angle [rad]")?;
         let points = &self.centerline;
         if points.len() < 2 {
             return Err(Error::invalid(what, "centerline", format!("{} points", points.len()), "at least 2 points"));
@@ -156,7 +189,7 @@ impl RodSpec {
                 return Err(Error::invalid(what, format!("centerline[{i}..{}]", i + 1), l, "neighboring points farther apart than radius / 1000"));
             }
         }
-        let frames = match &self.frames {
+        let mut frames = match &self.frames {
             Some(f) => {
                 if f.len() != n {
                     return Err(Error::invalid(what, "frames", format!("{} frames", f.len()), "one for each element"));
@@ -180,7 +213,7 @@ impl RodSpec {
             RestShape::Straight => own_lengths(),
             RestShape::AsInserted => {
                 for j in 1..n {
-                    rest_half[j] = crate::math::half(frames[j - 1].conjugate() * frames[j]);
+                    rest_half[j] = half(frames[j - 1].conjugate() * frames[j]);
                 }
                 own_lengths()
             }
@@ -204,12 +237,40 @@ impl RodSpec {
                         if !(phi.is_finite() && phi.length() < 3.0) {
                             return Err(Error::invalid(what, format!("rest.darboux[{}]", j - 1), d[j - 1], "finite, under 3 rad per element"));
                         }
-                        rest_half[j] = crate::math::exp(phi * 0.5);
+                        rest_half[j] = exp(phi * 0.5);
                     }
                 }
                 lengths
             }
         };
-        Ok(Lowered { rest_lengths, rest_half, frames })
+        let middles: Vec<f64> = rest_lengths
+            .iter()
+            .scan(0.0, |arc, l| {
+                *arc += l;
+                Some(*arc - 0.5 * l)
+            })
+            .collect();
+        if self.roll != 0.0 || self.pretwist != 0.0 {
+            let rate = self.pretwist / rest_lengths.iter().sum::<f64>();
+            let turn: Vec<DQuat> = middles.iter().map(|s| exp(DVec3::Z * (self.roll + rate * s))).collect();
+            for j in 1..n {
+                let angle = rate * (middles[j] - middles[j - 1]);
+                check(what, "pretwist", self.pretwist, angle.is_finite() && angle.abs() < 3.0, "under 3 rad per element")?;
+                rest_half[j] = half((turn[j - 1].conjugate() * (rest_half[j] * rest_half[j]) * turn[j]).normalize());
+            }
+            for (frame, turn) in frames.iter_mut().zip(&turn) {
+                *frame = (*frame * *turn).normalize();
+            }
+        }
+        let sections: Vec<_> = middles.iter().map(|s| SectionStiffness::new(&self.material, &self.section, self.radius, &self.along, *s)).collect();
+        for (section, l) in sections.iter().zip(&rest_lengths) {
+            let stiffness = (section.ea + section.bend.max_element()) / l;
+            check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
+        }
+        let flat = sections.iter().any(|s| s.bend.x != s.bend.y);
+        if self.material.plasticity.is_some() && flat {
+            return Err(Error::invalid(what, "material.plasticity", self.section, "no plasticity for a section that is stiffer one way than the other"));
+        }
+        Ok(Lowered { rest_lengths, rest_half, frames, sections, flat, radius: self.radius * self.along.size.largest() })
     }
 }

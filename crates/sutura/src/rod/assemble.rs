@@ -23,31 +23,44 @@ pub(crate) enum Hessian {
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian) {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
-        let last = rod.end - 1;
-        let half = (last - rod.start) / 2;
-        let middle = rod.start + half;
-        let at = At { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: hessian == Hessian::Exact, last };
-        // The first half in the low lane, the second in the high one.
-        let mut carry = Carry::none();
-        if half > 0 {
-            carry = at.carry(scratch, middle - 1).scaled(lanes(0.0, 1.0));
+        if is_flat(model, rod.start) {
+            assemble_rod::<true>(model, state, scratch, h, hessian, rod);
+        } else {
+            assemble_rod::<false>(model, state, scratch, h, hessian, rod);
         }
-        for i in 0..half {
-            carry = at.block(scratch, rod.start + i, middle + i, &carry);
-        }
-        carry = carry.high();
-        if middle + half < last {
-            carry = at.block(scratch, last - 1, last - 1, &carry);
-        }
-        at.last_block(scratch, &carry);
     }
     assemble_clamps(state, scratch, h);
+}
+
+/// Whether the rod that begins with particle `first` is stiffer one way than the other.
+fn is_flat(model: &Model, first: usize) -> bool {
+    model.rods.at(model.rod_of[first]).is_some_and(|rod| rod.flat)
+}
+
+fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, rod: Range<usize>) {
+    let last = rod.end - 1;
+    let half = (last - rod.start) / 2;
+    let middle = rod.start + half;
+    let at = At::<FLAT> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: hessian == Hessian::Exact, last };
+    // The first half in the low lane, the second in the high one.
+    let mut carry = Carry::none();
+    if half > 0 {
+        carry = at.carry(scratch, middle - 1).scaled(lanes(0.0, 1.0));
+    }
+    for i in 0..half {
+        carry = at.block(scratch, rod.start + i, middle + i, &carry);
+    }
+    carry = carry.high();
+    if middle + half < last {
+        carry = at.block(scratch, last - 1, last - 1, &carry);
+    }
+    at.last_block(scratch, &carry);
 }
 
 /// The residual and the Hessian without the clamps of the blocks `held` of a rod.
 pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &Range<usize>, held: Range<usize>) {
     let last = rod.end - 1;
-    let at = At { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, last };
+    let at = At::<true> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, last };
     let mut carry = if held.start > rod.start { at.carry(scratch, held.start - 1) } else { Carry::none() };
     for e in held {
         if e == last {
@@ -108,8 +121,8 @@ struct Element {
     kt: Sym2,
 }
 
-/// Where it is assembled.
-struct At<'a> {
+/// Where it is assembled. `FLAT`: joints may be stiffer one way than the other.
+struct At<'a, const FLAT: bool> {
     model: &'a Model,
     state: &'a State,
     inv_h2: f64,
@@ -119,7 +132,7 @@ struct At<'a> {
     last: usize,
 }
 
-impl At<'_> {
+impl<const FLAT: bool> At<'_, FLAT> {
     /// Writes the rows of two blocks, neither of them the last of the rod.
     #[inline(always)]
     fn block(&self, scratch: &mut Scratch, low: usize, high: usize, before: &Carry) -> Carry {
@@ -220,7 +233,7 @@ impl At<'_> {
         let off = Vec2::load(log(u0), log(u1));
         let mut torque = off.scaled(x).plus(t, z * t.dot(&off));
         let mut inertia = Sym2::scalar(x).square(t, z);
-        // Only what is attached has different moments across.
+        // Only flat sections and what is attached have different moments across.
         if i0.x != i0.y || i1.x != i1.y {
             let y = Vec2::load(q[low] * DVec3::Y, q[high] * DVec3::Y);
             let more = lanes(i0.y, i1.y) - x;
@@ -242,14 +255,13 @@ impl At<'_> {
         let (k0, k1) = (model.bend_stiffness[low] * on(low), model.bend_stiffness[high] * on(high));
         let gamma = lanes(model.bend_damping[low], model.bend_damping[high]) * f64x2::splat(self.inv_h);
         let plastic = Vec2::load(state.plastic[low], state.plastic[high]);
-        joint_terms(&j, &plastic, &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]), &Vec2::load(k0, k1), gamma)
+        joint_terms::<FLAT>(&j, &plastic, &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]), &Vec2::load(k0, k1), gamma)
     }
 }
 
-/// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation. Bending stiffness is the same
-/// in both directions.
+/// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation.
 #[inline(always)]
-fn joint_terms(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec2, gamma: f64x2) -> (Vec2, Sym2) {
+fn joint_terms<const FLAT: bool>(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec2, gamma: f64x2) -> (Vec2, Sym2) {
     let one = f64x2::splat(1.0);
     let moment = j.angle.less(plastic).plus(&j.angle.less(start), gamma).times(stiffness);
     let (bend, twist) = (stiffness.x * (one + gamma), stiffness.z * (one + gamma));
@@ -260,7 +272,11 @@ fn joint_terms(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec
     let [m1, m2, m3] = &j.middle;
     let w = m1.scaled(j.angle.x).plus(m2, j.angle.y).plus(m3, j.angle.z);
     let axis = m3.scaled(s).plus(&w, -(c * j.angle.z));
-    let b = Sym2::scalar(bend * s * s).square(&w, bend * c * (cc - (s + s))).square(&axis, twist - bend);
+    let mut b = Sym2::scalar(bend * s * s).square(&w, bend * c * (cc - (s + s))).square(&axis, twist - bend);
+    let flat = stiffness.y - stiffness.x;
+    if FLAT && flat != f64x2::ZERO {
+        b = b.square(&m2.scaled(s).plus(&w, -(c * j.angle.y)), flat * (one + gamma));
+    }
     let turned = m1.scaled(moment.x).plus(m2, moment.y).plus(m3, moment.z);
     (turned.scaled(s).plus(&w, -(c * j.angle.dot(&moment))), b)
 }
@@ -270,7 +286,7 @@ pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat, h: f64) -> (DVec3, DMat3) {
     let (q0, q1) = if c.first { (c.orientation, q) } else { (q, c.orientation) };
     let j = strain::joints([q0; 2], [q1; 2], [c.rest_half; 2]);
     let twice = |v: DVec3| Vec2::load(v, v);
-    let (moment, b) = joint_terms(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping / h));
+    let (moment, b) = joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping / h));
     (moment.split().0, b.split().0)
 }
 
@@ -279,7 +295,7 @@ mod tests {
     use super::*;
     use crate::math::exp;
     use crate::rod::element_strain;
-    use crate::{Material, RodSpec, World};
+    use crate::{Material, RodSpec, Section, World};
 
     /// Numbers in [-0.5, 0.5) from a seed.
     fn noise(seed: &mut u64) -> f64 {
@@ -293,11 +309,17 @@ mod tests {
 
     #[test]
     fn the_exact_hessian_is_the_derivative_of_the_residual() {
+        for section in [Section::Round, Section::Rectangle([2e-3, 5e-3])] {
+            compare_derivatives(section);
+        }
+    }
+
+    fn compare_derivatives(section: Section) {
         // A bent, twisted, stretched rod with soft section, so that every term matters.
         let mut seed = 7;
         let n = 5;
         let mut world = World::default();
-        let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0));
+        let spec = RodSpec { section, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0)) };
         world.insert_rod(&spec).unwrap();
         let (model, mut state) = world.into_parts();
         for i in 0..=n {

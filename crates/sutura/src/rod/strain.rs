@@ -4,7 +4,7 @@
 //! With d = x1 - x0 and world increments dx, phi (q <- exp(phi) q), `R dC = dx1 - dx0 + d x phi`.
 //!
 //! Bend and twist of a joint: `theta = log(h^-1 r h^-1)` \[rad\], r = conj(q0) q1, h the square root of its rest value; energy
-//! `theta^T B theta / 2`, B = diag(EI, EI, GJ) / lbar. The symmetric form gives the same energy when the rod is numbered from the other end (the
+//! `theta^T B theta / 2`, B = diag(E I1, E I2, GJ) / lbar. The symmetric form gives the same energy when the rod is numbered from the other end (the
 //! one-sided h^-2 r does not); the logarithm stays linear to 180 degrees. With delta = phi1 - phi0, `d theta = M(theta) Rm^T delta`,
 //! Rm = R(q0 h exp(theta/2)) the frame halfway and M = I + (a / sin a - 1) (across theta), a = |theta| / 2.
 //!

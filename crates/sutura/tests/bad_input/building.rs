@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_usable, point, step, straight, thread};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, RestShape, RodSpec, Settings, ShapeMotion,
-    ShapeSpec, Shear, World,
+    Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings,
+    ShapeMotion, ShapeSpec, Shear, World,
 };
 
 /// An error of the kind that names a field, and the field.
@@ -99,7 +99,19 @@ fn threads_that_cannot_be() {
         ("rest.darboux[0]", with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::X * 1e6; 19]) })),
         ("rest.darboux[0]", with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::splat(NAN); 19]) })),
     ];
+    bad.push(("along.size[1]", with(&|s| s.along.size = Profile(vec![(0.1, 1.0), (0.1, 1.0)]))));
+    bad.push(("pretwist", with(&|s| s.pretwist = 1e6)));
+    for x in [NAN, INF] {
+        bad.push(("roll", with(&|s| s.roll = x)));
+        bad.push(("pretwist", with(&|s| s.pretwist = x)));
+        bad.push(("along.size[0]", with(&|s| s.along.size = Profile(vec![(x, 1.0)]))));
+    }
     for x in [0.0, -1.0, NAN, INF] {
+        bad.push(("section", with(&|s| s.section = Section::Ellipse([1e-4, x]))));
+        bad.push(("section", with(&|s| s.section = Section::Rectangle([x, 1e-4]))));
+        bad.push(("along.size[0]", with(&|s| s.along.size = Profile(vec![(0.0, x)]))));
+        bad.push(("along.modulus[0]", with(&|s| s.along.modulus = Profile(vec![(0.0, x)]))));
+        bad.push(("along.density[0]", with(&|s| s.along.density = Profile(vec![(0.0, x)]))));
         bad.push(("radius", with(&|s| s.radius = x)));
         bad.push(("rest.lengths[0]", with(&|s| s.rest = RestShape::Given { lengths: Some(vec![x; 20]), darboux: None })));
         bad.push(("young_modulus", made_of(&|m| m.young_modulus = x)));

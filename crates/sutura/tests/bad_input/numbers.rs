@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_finite, assert_usable, point, step, straight, thread};
 use sutura::glam::DVec3;
 use sutura::{
-    Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, RestShape, RodSpec, Settings, ShapeMotion, ShapeSpec,
-    Shear, Stretch, World,
+    Along, Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, Profile, RestShape, RodSpec, Section, Settings,
+    ShapeMotion, ShapeSpec, Shear, Stretch, World,
 };
 
 #[test]
@@ -89,6 +89,10 @@ fn absurd_threads() {
         absurd(&format!("modulus {x:e}"), insert(spec(points(0.01), radius, &Material { young_modulus: x, ..material.clone() })));
         absurd(&format!("shear modulus {x:e}"), insert(spec(points(0.01), radius, &Material { shear: Shear::Modulus(x), ..material.clone() })));
         absurd(&format!("damping {x:e}"), insert(spec(points(0.01), radius, &Material { bend_damping: x, ..material.clone() })));
+        let thin = Section::Rectangle([x, 1e-4]);
+        absurd(&format!("a side of {x:e}"), insert(RodSpec { section: thin, ..spec(points(0.01), radius, &material) }));
+        let along = Along { modulus: Profile(vec![(0.0, 1.0), (0.01, x)]), ..Along::default() };
+        absurd(&format!("modulus to {x:e}"), insert(RodSpec { along, ..spec(points(0.01), radius, &material) }));
         let far: Vec<DVec3> = points(0.01).iter().map(|p| *p + DVec3::Y * x).collect();
         absurd(&format!("{x:e} away"), insert(spec(far, radius, &material)));
         let crossing = points(x).iter().map(|p| DVec3::new(0.5 * x, p.x - 0.5 * x, 0.0)).collect::<Vec<_>>();

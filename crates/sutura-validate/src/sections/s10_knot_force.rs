@@ -61,8 +61,7 @@ fn force_at(o: &Outcome, eps: f64) -> f64 {
 }
 
 fn drawn(mu: f64) -> Study {
-    let reason = "theory is a limit for small eps, approached slowly: see the thinner threads below. What friction adds is mu times the sum of the contact forces, and \
-         that is 0.61, 0.67 and 0.8 EI eps^3 / h^2 at eps = 0.051, 0.073 and 0.11 (mu = 0), on its way to 0.492";
+    let reason = "theory is a limit for small eps, approached slowly: see the thinner threads below";
     let mut study = Study::new(format!("mu = {mu}"), "knot_force").set("friction.default", mu).elements("rod", &[200, 400]).curve(move |o| {
         let drifting = if mu > 0.0 { f64::INFINITY } else { DRIFTING };
         let times = series(o, "curvature").into_iter().map(|p| p.0).filter(|t| *t > GATHERING);
@@ -98,7 +97,7 @@ fn thinner(mu: f64) -> Study {
         force * h * h / rod.ei() / audoly(mu, (h * CURVATURE).sqrt())
     };
     let quantity = Quantity::measured("force over that of the limit", ratio, vec![1.0], "Audoly et al.", Bar::Within(0.33))
-        .because("theory is a limit for small eps, approached slowly: straight lines through the last two values meet eps = 0 at 1.0 to 1.1");
+        .because("theory is a limit for small eps, approached slowly");
     Study::new(format!("thinner, mu = {mu}"), "knot_force")
         .set("friction.default", mu)
         .set("phase.draw.max_duration", "\"4.2 s\"")

@@ -166,7 +166,7 @@ mod tests {
         let s = c.nearest_on_segment(&Pose::IDENTITY, a, b, 1.0001e-4).unwrap();
         // Fourteen golden sections leave 1e-3 of the segment.
         assert!((s - 0.75).abs() < 2e-3, "{s}");
-        // The chord comes as near as 1e-4; the tangents at its ends and middle know that it cannot come nearer than 0.97e-4.
+        // The chord comes as near as 1e-4.
         assert_eq!(c.nearest_on_segment(&Pose::IDENTITY, a, b, 0.9999e-4), None);
         assert!(least_by_tangents((1.0, -2.0), (1.0, 2.0), 0.5) == 0.5);
     }

@@ -93,6 +93,7 @@ pub struct Audit {
     arc: Vec<f64>,
     /// One a thread: boxes around what its elements swept.
     trees: Vec<BoxTree>,
+    welds: Vec<SeenWeld>,
     shapes: Vec<SeenShape>,
 }
 
@@ -124,6 +125,14 @@ struct SeenShape {
     alive: bool,
 }
 
+/// Places that are joined at the state at hand: the number of the thread there and the rest arc on it, and up to which way by there elements of the
+/// threads do not touch.
+#[derive(Debug)]
+struct SeenWeld {
+    places: Vec<(usize, f64)>,
+    exempt: f64,
+}
+
 /// One thread at one state, as plain slices.
 #[derive(Debug, Clone, Copy)]
 struct RodSlice<'a> {
@@ -153,10 +162,16 @@ impl Audit {
     /// Looks at an accepted state, and at what was swept since the one before.
     pub fn observe(&mut self, view: View<'_>) {
         let rods = view.rods().map(|r| RodSlice { slot: r.slot(), radius: r.radius(), positions: r.positions(), rest_lengths: r.rest_lengths() });
-        self.observe_slices(view.time(), rods, view.shapes());
+        self.observe_slices(view.time(), rods, view.shapes(), view.welds().map(|w| (w.exempt(), w.places().collect())));
     }
 
-    fn observe_slices<'a>(&mut self, time: f64, rods: impl Iterator<Item = RodSlice<'a>>, shapes: impl Iterator<Item = ShapeView<'a>>) {
+    fn observe_slices<'a>(
+        &mut self,
+        time: f64,
+        rods: impl Iterator<Item = RodSlice<'a>>,
+        shapes: impl Iterator<Item = ShapeView<'a>>,
+        welds: impl Iterator<Item = (f64, Vec<(usize, usize)>)>,
+    ) {
         self.report.states += 1;
         core::mem::swap(&mut self.now, &mut self.before);
         if !self.take_up(rods) {
@@ -166,6 +181,7 @@ impl Audit {
             return;
         }
         self.refit();
+        self.take_welds(welds);
         self.threads(time);
         self.all_shapes(time, shapes);
     }
@@ -203,6 +219,19 @@ impl Audit {
         true
     }
 
+    /// Places by thread slot and particle.
+    fn take_welds(&mut self, welds: impl Iterator<Item = (f64, Vec<(usize, usize)>)>) {
+        let Audit { now, arc, welds: seen, .. } = self;
+        seen.clear();
+        for (exempt, places) in welds {
+            let place = |(slot, particle): (usize, usize)| {
+                let k = now.rods.iter().position(|rod| rod.slot == slot)?;
+                Some((k, arc[now.rods[k].first + particle]))
+            };
+            seen.push(SeenWeld { places: places.into_iter().filter_map(place).collect(), exempt });
+        }
+    }
+
     /// Boxes around what each element swept, grown so that two overlap when the elements are nearer than any before: only then does
     /// their clearance matter. What crosses overlaps anyway.
     fn refit(&mut self) {
@@ -224,16 +253,26 @@ impl Audit {
     }
 
     fn threads(&mut self, time: f64) {
-        let Audit { report, now, before, arc, trees, .. } = self;
+        let Audit { report, now, before, arc, trees, welds, .. } = self;
+        // The shortest rest arc from an element to a weld, and whether two elements are near each other by way of one.
+        let way = |weld: &SeenWeld, k: usize, e: usize| {
+            let (from, to) = (arc[now.rods[k].first + e], arc[now.rods[k].first + e + 1]);
+            weld.places.iter().filter(|p| p.0 == k).map(|p| (p.1 - to).max(from - p.1).max(0.0)).fold(f64::INFINITY, f64::min)
+        };
+        let joined = |i: usize, e: usize, k: usize, f: usize| welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.exempt);
         for (i, rod) in now.rods.iter().enumerate() {
             let apart = core::f64::consts::PI * rod.radius;
             trees[i].pairs(&mut |e, f| {
-                if arc[rod.first + f] - arc[rod.first + e + 1] >= apart {
+                if arc[rod.first + f] - arc[rod.first + e + 1] >= apart && !joined(i, e, i, f) {
                     thread_pair(report, now, before, time, (rod, e), (rod, f));
                 }
             });
-            for (other, tree) in now.rods.iter().zip(trees.iter()).skip(i + 1) {
-                trees[i].pairs_with(tree, &mut |e, f| thread_pair(report, now, before, time, (rod, e), (other, f)));
+            for (k, (other, tree)) in now.rods.iter().zip(trees.iter()).enumerate().skip(i + 1) {
+                trees[i].pairs_with(tree, &mut |e, f| {
+                    if !joined(i, e, k, f) {
+                        thread_pair(report, now, before, time, (rod, e), (other, f));
+                    }
+                });
             }
         }
     }

@@ -89,6 +89,10 @@ impl<T> Slots<T> {
             }
         }
     }
+    /// The handle of the living thing in a slot.
+    pub(crate) fn handle<K>(&self, index: u32) -> Handle<K> {
+        Handle::new(index, self.slots[index as usize].0)
+    }
     pub(crate) fn raw(&self) -> &Vec<(u32, Option<T>)> {
         &self.slots
     }

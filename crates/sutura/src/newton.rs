@@ -8,12 +8,13 @@
 use crate::math::{exp, outer};
 use crate::model::Model;
 use crate::model::grip::Hold;
+use crate::model::rod::RodModel;
 use crate::rod::assemble::{Hessian, assemble, assemble_blocks, assemble_clamps};
 use crate::rod::element_strain;
 use crate::row;
-use crate::row::pushed::Sliders;
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;
+use core::ops::Range;
 use glam::DVec3;
 
 /// Elongation to which inextensible elements are held.
@@ -82,7 +83,6 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             }
             let part = (gained / (gained - left)).max(SHORTEST);
             apply(model, state, scratch, -(1.0 - part) * taken * scale);
-            scratch.rows.sliders.apply(state, -(1.0 - part) * taken * scale);
             taken *= part;
         }
         let blocks = core::mem::take(&mut scratch.rods);
@@ -92,15 +92,13 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             scratch.torque_correction.apply(&scratch.system, rod, zone, &scratch.torque, &mut scratch.step);
         }
         scratch.rods = blocks;
-        Sliders::factor(scratch);
-        scratch.rows.sliders.couple(&mut scratch.step, false);
+        scratch.rows.border.couple(&mut scratch.step, false);
         row::couple::couple(state, scratch);
         gained = work_ahead(model, state, scratch);
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
-        apply(model, state, scratch, scale);
+        let slid = apply(model, state, scratch, scale);
         row::shape::predict(scratch, scale);
-        let slid = scratch.rows.sliders.apply(state, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
             (waiting, exact) = (false, true);
@@ -144,7 +142,7 @@ fn carried_forces(model: &Model, state: &State, scratch: &mut Scratch) {
 /// Work of the forces at the iterate, contact forces as last found, along the last step.
 fn work(scratch: &Scratch) -> f64 {
     let own: f64 = scratch.rhs.iter().zip(&scratch.step).map(|(r, z)| r.dot(*z)).sum();
-    own + row::couple::work(scratch) + scratch.rows.sliders.work()
+    own + row::couple::work(scratch) + scratch.rows.border.work()
 }
 
 /// Linear change of an element's strain along the last step.
@@ -183,13 +181,16 @@ fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 pub(crate) fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
     row::shape::assemble(model, state, scratch, h, first);
+    let Scratch { rows, rhs, system, .. } = &mut *scratch;
+    rows.welds.assemble_joints(state, rhs, &mut system.diagonal, h);
+    row::weld::gather(model, state, scratch, hessian == Hessian::Exact);
     restrict(state, scratch);
-    let Scratch { system, rods, .. } = scratch;
+    let Scratch { system, rods, rows, freedom, .. } = scratch;
     let mut positive = true;
     for (rod, zone) in rods.iter() {
         positive &= system.factor(rod.clone(), zone);
     }
-    positive
+    rows.border.factor(system, rods, freedom) && positive
 }
 
 /// Takes held nodes out of the system and puts the drive on guided ones.
@@ -214,27 +215,48 @@ fn restrict(state: &State, scratch: &mut Scratch) {
 pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     for (_, grip) in state.grips.iter() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
-        let first = rod.first as usize + grip.index as usize;
+        let first = (rod.first + grip.index) as usize;
         let held = if grip.hold == Hold::Jaw { first..first + 2 } else { first..first + 1 };
-        for e in held.start.max(rod.first as usize + 1) - 1..held.end.min(rod.elements().end) {
-            scratch.tension[e] = state.tension[e];
-            if model.inextensible[e] {
-                // The multiplier alone is the tension of an inextensible element; its penalty is taken off again.
-                scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
+        unbalanced_blocks(model, state, scratch, h, rod, held.clone());
+        // Where a weld is held, what all threads there lack.
+        for weld in held.filter_map(|i| model.weld_of[i]) {
+            for member in &model.welds.at(weld).expect("living").members {
+                let (rod, i) = (model.rods.at(member.rod).expect("welds go with their rods"), member.index(model));
+                if !(first..first + 2).contains(&i) {
+                    unbalanced_blocks(model, state, scratch, h, rod, i..i + 1);
+                }
             }
         }
-        assemble_blocks(model, state, scratch, h, &rod.particles(), held);
     }
     assemble_clamps(state, scratch, h);
+    let Scratch { rows, rhs, system, .. } = &mut *scratch;
+    rows.welds.assemble_joints(state, rhs, &mut system.diagonal, h);
     row::shape::assemble(model, state, scratch, h, false);
     row::couple::add_forces(scratch);
 }
 
+fn unbalanced_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &RodModel, held: Range<usize>) {
+    for e in held.start.max(rod.first as usize + 1) - 1..held.end.min(rod.elements().end) {
+        scratch.tension[e] = state.tension[e];
+        if model.inextensible[e] {
+            // The multiplier alone is the tension of an inextensible element; its penalty is taken off again.
+            scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
+        }
+    }
+    assemble_blocks(model, state, scratch, h, &rod.particles(), held);
+}
+
 /// Factor on the update: no element turns by more than 0.3 rad in an iteration, and no pair of threads gets closer than half its gap.
 fn limit(state: &State, scratch: &Scratch) -> f64 {
-    let turn = scratch.step.iter().skip(1).step_by(2).map(|v| v.length_squared()).fold(0.0, max_or_nan).sqrt();
+    let turn = scratch.step.iter().skip(1).step_by(2).map(|v| v.length_squared()).fold(weld_turn(scratch), max_or_nan).sqrt();
     let by_turn = if turn > 0.3 { 0.3 / turn } else { 1.0 };
     by_turn.min(row::thread::limit(state, scratch, by_turn))
+}
+
+/// Greatest turn of a weld in the last step, squared.
+fn weld_turn(scratch: &Scratch) -> f64 {
+    let rows = &scratch.rows;
+    rows.welds.turn_squared(rows.sliders.count(), &rows.border)
 }
 
 /// Maximum that keeps NaN.
@@ -269,7 +291,8 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
     out.abs() > TRUSTED * kept
 }
 
-fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
+/// Takes a part of the step; the largest move of a pushed shape \[m\].
+fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) -> f64 {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
         for e in rod.start..rod.end - 1 {
@@ -287,6 +310,9 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) {
             state.orientation[e] = (exp(scratch.step[2 * e + 1] * scale) * state.orientation[e]).normalize();
         }
     }
+    let rows = &scratch.rows;
+    rows.welds.apply(state, rows.sliders.count(), &rows.border, scale);
+    rows.sliders.apply(state, &rows.border, scale)
 }
 
 /// Largest |elongation| of an inextensible element: a second-order error of the turn that Newton just made.
@@ -305,7 +331,7 @@ fn inextensible_error(model: &Model, state: &State) -> f64 {
 }
 
 fn largest_move(model: &Model, scratch: &Scratch, scale: f64) -> (f64, f64) {
-    let (mut turn, mut shift) = (0.0, 0.0);
+    let (mut turn, mut shift) = (weld_turn(scratch), 0.0);
     for ((_, rod), (blocks, _)) in model.rods.iter().zip(&scratch.rods) {
         let mut far = 0.0;
         for i in blocks.clone() {

@@ -8,7 +8,7 @@ use crate::state::{GripState, LoadState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version.
-const MAGIC: &[u8; 8] = b"sutura\x02\0";
+const MAGIC: &[u8; 8] = b"sutura\x03\0";
 
 /// Something that is written and read back without loss.
 trait Bytes: Sized {
@@ -188,6 +188,7 @@ structure!(State {
     tension,
     plastic,
     hardened,
+    weld_orientation,
     shape_pose,
     shape_target,
     grips,

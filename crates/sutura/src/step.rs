@@ -176,6 +176,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
     scratch.freedom.fill(Freedom::Free);
     scratch.joint_on.fill(true);
     scratch.clamps.clear();
+    scratch.rows.welds.begin(model, state, &mut scratch.joint_on);
     for (rod, _) in &scratch.rods {
         for i in rod.clone() {
             state.position[i] += state.velocity[i] * h;
@@ -224,6 +225,12 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
         };
         match grip.hold {
             Hold::Pin => place(i, pose.position),
+            Hold::Clamp if let Some(weld) = model.weld_of[i] => {
+                // The weld's own half joints hold on to its cross-section.
+                place(i, pose.position);
+                state.weld_orientation[weld as usize] = pose.orientation;
+                scratch.rows.welds.hold_turning(weld);
+            }
             Hold::Clamp => {
                 place(i, pose.position);
                 if i > first && i < first + rod.n_elements as usize {
@@ -262,6 +269,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             }
         }
     }
+    scratch.rows.welds.predict(model, state, &mut scratch.freedom, h);
     for (slot, shape) in model.shapes.iter() {
         let k = slot as usize;
         if matches!(shape.motion, ShapeMotion::Driven) {
@@ -299,7 +307,7 @@ fn yield_plastic(model: &Model, state: &mut State) {
         let Some(p) = rod.material.plasticity else { continue };
         // Plastic modulus so that the slope after yield is `hardening` times the elastic one.
         let harden = p.hardening / (1.0 - p.hardening);
-        for e in rod.elements().skip(1) {
+        for e in rod.elements().skip(1).filter(|e| model.weld_of[*e].is_none()) {
             let l = model.joint_length[e];
             let a = crate::rod::joint_angle(model, state, e);
             let grown = 1.0 + harden * state.hardened[e];
@@ -323,14 +331,21 @@ fn yield_plastic(model: &Model, state: &mut State) {
 /// Force and torque of each grip on its thread, from what was left unbalanced at its nodes.
 fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
     newton::unbalanced(model, state, scratch, h);
+    // At a weld all threads together.
+    let rhs = &scratch.rhs;
+    let lacking = |i: usize| match model.weld_of[i].and_then(|w| model.welds.at(w)) {
+        Some(weld) => weld.members.iter().map(|m| rhs[2 * m.index(model)]).sum(),
+        None => rhs[2 * i],
+    };
     let (position, grips) = (&state.position, &mut state.grips);
     for (slot, grip) in grips.iter_mut() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
         let i = rod.first as usize + grip.index as usize;
         grip.torque = DVec3::ZERO;
-        grip.force = -scratch.rhs[2 * i];
+        grip.force = -lacking(i);
         match grip.hold {
             Hold::Pin => {}
+            Hold::Clamp if let Some(weld) = model.weld_of[i] => grip.torque = -scratch.rows.welds.moment(weld),
             Hold::Clamp => {
                 for c in scratch.clamps.iter().filter(|c| c.grip == slot) {
                     let (moment, _) = crate::rod::assemble::clamp_terms(c, state.orientation[c.frame as usize], h);
@@ -338,7 +353,7 @@ fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
                 }
             }
             Hold::Jaw => {
-                let other = -scratch.rhs[2 * i + 2];
+                let other = -lacking(i + 1);
                 let arm = (position[i + 1] - position[i]) * 0.5;
                 grip.torque = arm.cross(other - grip.force) - scratch.rhs[2 * i + 1];
                 grip.force += other;

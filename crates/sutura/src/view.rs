@@ -5,6 +5,7 @@ use crate::model::Model;
 use crate::model::material::SectionStiffness;
 use crate::model::rod::RodModel;
 use crate::model::shape::Geometry;
+use crate::model::weld::WeldModel;
 use crate::state::State;
 use glam::{DQuat, DVec3};
 
@@ -33,6 +34,27 @@ pub struct ShapeView<'a> {
     pub pose: Pose,
     /// Its slot, unique among living shapes ([`Handle::index`](crate::Handle::index)).
     pub slot: usize,
+}
+
+/// Places of threads that are joined, at one accepted state.
+#[derive(Clone, Copy)]
+pub struct WeldView<'a> {
+    weld: &'a WeldModel,
+    /// Its point and cross-section, `world_from_weld`.
+    pub pose: Pose,
+    /// Its slot, unique among living welds ([`Handle::index`](crate::Handle::index)).
+    pub slot: usize,
+}
+
+impl<'a> WeldView<'a> {
+    /// The places joined: slot of the thread and particle on it.
+    pub fn places(&self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        self.weld.members.iter().map(|m| (m.rod as usize, m.particle as usize))
+    }
+    /// Elements of the joined threads whose way to each other through the weld is shorter than this do not touch \[m\].
+    pub fn exempt(&self) -> f64 {
+        self.weld.exempt
+    }
 }
 
 /// A contact that carries force.
@@ -98,6 +120,14 @@ impl<'a> View<'a> {
         let (model, state) = (self.model, self.state);
         model.shapes.iter().map(move |(slot, s)| ShapeView { geometry: &s.geometry, pose: state.shape_pose[slot as usize], slot: slot as usize })
     }
+    /// The living welds in slot order.
+    pub fn welds(&self) -> impl Iterator<Item = WeldView<'a>> + use<'a> {
+        let (model, state) = (self.model, self.state);
+        model.welds.iter().map(move |(slot, weld)| {
+            let position = state.position[weld.members[0].index(model)];
+            WeldView { weld, pose: Pose::new(position, state.weld_orientation[slot as usize]), slot: slot as usize }
+        })
+    }
     pub(crate) fn rod_at(&self, slot: u32) -> Option<RodView<'a>> {
         let (model, state) = (self.model, self.state);
         model.rods.at(slot).map(|rod| RodView { model, state, rod, slot })
@@ -109,9 +139,19 @@ impl<'a> RodView<'a> {
     pub fn slot(&self) -> usize {
         self.slot as usize
     }
-    /// Number of elements n; there are n + 1 particles and n - 1 joints.
+    /// Number of elements n; there are n + 1 particles and n - 1 joints. A closed thread's last particle is at its first, and it has n joints.
     pub fn n_elements(&self) -> usize {
         self.rod.n_elements as usize
+    }
+    /// Whether its end is joined to its start.
+    pub fn is_closed(&self) -> bool {
+        let particles = self.rod.particles();
+        let seam = self.model.weld_of[particles.start];
+        seam.is_some() && seam == self.model.weld_of[particles.end - 1]
+    }
+    /// Number of joints between its elements.
+    pub fn n_joints(&self) -> usize {
+        self.n_elements() - usize::from(!self.is_closed())
     }
     /// Radius with which it touches \[m\].
     pub fn radius(&self) -> f64 {
@@ -168,15 +208,23 @@ impl<'a> RodView<'a> {
     pub fn internal_force(&self, element: usize) -> DVec3 {
         crate::rod::internal_force(self.model, self.state, self.rod, self.rod.first as usize + element)
     }
-    /// Bend and twist of a joint (between elements `joint` and `joint + 1`) less its rest value, along d1, d2, d3 of the frame halfway \[1/m\].
+    /// Bend and twist of a joint (between elements `joint` and `joint + 1`; that of a closed thread's seam is the last) less its rest value, along d1,
+    /// d2, d3 of the frame halfway \[1/m\].
     pub fn strain(&self, joint: usize) -> DVec3 {
         let f = self.rod.first as usize + joint + 1;
-        crate::rod::joint_angle(self.model, self.state, f) / self.model.joint_length[f]
+        if self.model.weld_of[f].is_none() {
+            return crate::rod::joint_angle(self.model, self.state, f) / self.model.joint_length[f];
+        }
+        let length = 0.5 * (self.rest_lengths()[joint] + self.rest_lengths()[(joint + 1) % self.n_elements()]);
+        crate::rod::welded_joint(self.model, self.state, self.rod, f).map(|(angle, _)| angle).sum::<DVec3>() / length
     }
-    /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\]. Damping is not part of it.
+    /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\], at a weld the mean of both sides. Damping is not part of it.
     pub fn moment(&self, joint: usize) -> DVec3 {
         let f = self.rod.first as usize + joint + 1;
-        crate::rod::joint_angle(self.model, self.state, f) * self.model.bend_stiffness[f]
+        if self.model.weld_of[f].is_none() {
+            return crate::rod::joint_angle(self.model, self.state, f) * self.model.bend_stiffness[f];
+        }
+        crate::rod::welded_joint(self.model, self.state, self.rod, f).map(|(angle, stiffness)| angle * stiffness * 0.5).sum()
     }
     /// Largest |length - rest length| / rest length of an element.
     pub fn max_elongation(&self) -> f64 {
@@ -191,7 +239,8 @@ impl<'a> RodView<'a> {
     pub fn max_tension(&self) -> f64 {
         (0..self.n_elements()).map(|j| self.tension(j)).fold(f64::NEG_INFINITY, f64::max)
     }
-    /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is kept).
+    /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is kept). At the seam of a closed
+    /// thread the twist at rest does not count, so that it is what was put in before closing.
     pub fn twist(&self) -> f64 {
         let q = self.orientations();
         let mut angle = 0.0;
@@ -200,7 +249,22 @@ impl<'a> RodView<'a> {
             let carried = crate::math::rotation_arc(t0, t1) * q[j - 1];
             angle += log(carried.conjugate() * q[j]).z;
         }
+        if let Some(rest) = self.seam_rest() {
+            let (last, first) = (q[q.len() - 1], q[0]);
+            let carried = crate::math::rotation_arc(last * DVec3::Z, first * DVec3::Z) * last;
+            // Of a rotation, the part about the third director.
+            let about = |q: DQuat| log(DQuat::from_xyzw(0.0, 0.0, q.z, q.w).normalize()).z;
+            angle += log(crate::math::exp(DVec3::Z * (about(carried.conjugate() * first) - about(rest)))).z;
+        }
         angle / core::f64::consts::TAU
+    }
+    /// Rest rotation from the last frame of a closed thread to its first.
+    fn seam_rest(&self) -> Option<DQuat> {
+        let weld = self.model.welds.at(self.model.weld_of[self.rod.first as usize].filter(|_| self.is_closed())?)?;
+        let of = |particle: u32| weld.members.iter().find(|m| m.rod == self.slot && m.particle == particle);
+        let (before, after) = (of(self.rod.n_elements)?.before?, of(0)?.after?);
+        let half = before.rest_half * before.rest_half * before.section.conjugate();
+        Some(half * after.section * after.rest_half * after.rest_half)
     }
     /// Mechanical energy of this thread.
     pub fn energy(&self) -> Energy {

@@ -6,9 +6,11 @@ use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
+use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
 use crate::model::{Model, ShapeModel};
 use crate::params::{Friction, Settings};
 use crate::report::{Incident, IncidentKind, StepReport};
+use crate::row;
 use crate::scratch::Scratch;
 use crate::state::{GripState, LoadState, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
@@ -39,6 +41,7 @@ const ROD: Error = Error::StaleHandle { what: "rod" };
 const SHAPE: Error = Error::StaleHandle { what: "shape" };
 const GRIP: Error = Error::StaleHandle { what: "grip" };
 const LOAD: Error = Error::StaleHandle { what: "load" };
+const WELD: Error = Error::StaleHandle { what: "weld" };
 
 /// Substeps that one call may take.
 const MOST_SUBSTEPS: f64 = 1e6;
@@ -104,7 +107,7 @@ impl World {
             model.bend_stiffness.push(if joint > 0.0 { joined(low.sections[e - 1].bend, before, section.bend, after) } else { section.bend / l });
             model.bend_damping.push(spec.material.bend_damping);
             model.rest_half.push(if e < n { low.rest_half[e] } else { DQuat::IDENTITY });
-            state.position.push(spec.centerline[e]);
+            state.position.push(low.centerline[e]);
             state.orientation.push(if e < n { low.frames[e] } else { DQuat::IDENTITY });
         }
         let total = first + n + 1;
@@ -119,10 +122,16 @@ impl World {
             }
         }
         self.refresh_masses();
+        self.refresh_welds();
+        if let Some([before, after]) = low.seam {
+            let member = |particle, before, after| Member { rod: handle.index, particle, before, after };
+            let orientation = row::weld::between(low.frames[n - 1], low.frames[0], before * after);
+            self.join(vec![member(n as u32, Some(Side::along(before)), None), member(0, None, Some(Side::along(after)))], orientation);
+        }
         Ok(handle)
     }
 
-    /// Removes a thread with its grips and loads.
+    /// Removes a thread with its grips and loads. What it was welded to comes apart where fewer than two threads are left.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
         let gone = self.model.rods.remove(rod).ok_or(ROD)?;
         let range = gone.particles();
@@ -167,7 +176,128 @@ impl World {
         }
         state.grips.retain(|g| g.rod != rod.index);
         state.loads.retain(|l| l.rod != rod.index);
+        for (_, weld) in model.welds.iter_mut() {
+            weld.members.retain(|m| m.rod != rod.index);
+        }
+        model.welds.retain(|w| w.members.len() >= 2);
+        self.refresh_welds();
         Ok(())
+    }
+
+    /// Joins places of threads. Where they lie apart (by a tenth of a radius at most) they meet in the middle, or at the one that is held.
+    pub fn insert_weld(&mut self, spec: &WeldSpec) -> Result<Handle<Weld>, Error> {
+        spec.validate()?;
+        let (model, state) = (&self.model, &self.state);
+        let mut places: Vec<(u32, u32, usize)> = Vec::new();
+        for (rod, place) in &spec.places {
+            let r = model.rods.get(*rod).ok_or(ROD)?;
+            place.validate("weld", model, r)?;
+            let particle = place.particle(model, r);
+            let i = (r.first + particle) as usize;
+            if model.weld_of[i].is_some() || places.iter().any(|p| p.2 == i) {
+                return Err(Error::invalid("weld", "places", place, "a place that is not welded yet"));
+            }
+            places.push((rod.index, particle, i));
+        }
+        let least = places.iter().map(|p| self.radius_of(p.2)).fold(f64::INFINITY, f64::min);
+        let middle = places.iter().map(|p| state.position[p.2]).sum::<DVec3>() / places.len() as f64;
+        let apart = places.iter().map(|p| (state.position[p.2] - middle).length()).fold(0.0, f64::max);
+        if apart > 0.1 * least {
+            return Err(Error::invalid("weld", "places", apart, "places within a tenth of a radius of each other [m]"));
+        }
+        let held: Vec<usize> = places.iter().map(|p| p.2).filter(|i| self.is_held(*i)).collect();
+        if held.len() > 1 {
+            return Err(Error::invalid("weld", "places", format!("{} held", held.len()), "at most one place that a grip holds"));
+        }
+        let frames = |(slot, particle, i): (u32, u32, usize)| {
+            let n = model.rods.at(slot).expect("just read").n_elements;
+            ((particle > 0).then(|| state.orientation[i - 1]), (particle < n).then(|| state.orientation[i]))
+        };
+        // A thread that goes on through the weld decides how its cross-section is turned, else the first one that ends there.
+        let through = places.iter().find_map(|p| match frames(*p) {
+            (Some(a), Some(b)) => Some(row::weld::between(a, b, model.rest_half[p.2])),
+            _ => None,
+        });
+        let (before, after) = frames(places[0]);
+        let orientation = through.or(before).or(after).expect("a thread has frames");
+        let straight = |q: DQuat, outward: DVec3| match spec.rest {
+            WeldRest::AsInserted => q,
+            // Turned so that it goes on where the first one leads.
+            WeldRest::Straight => {
+                let leads = orientation * if before.is_some() { DVec3::Z } else { DVec3::NEG_Z };
+                (crate::math::rotation_arc(outward, leads) * q).normalize()
+            }
+        };
+        let mut members = Vec::new();
+        for (k, place) in places.iter().enumerate() {
+            let (rod, particle, i) = *place;
+            let (before, after) = match frames(*place) {
+                (Some(_), Some(_)) if spec.rest == WeldRest::Straight => {
+                    return Err(Error::invalid("weld", "places", particle, "ends of threads where they go on straight"));
+                }
+                (Some(_), Some(_)) => {
+                    let quarter = Side::along(crate::math::half(model.rest_half[i]));
+                    (Some(quarter), Some(quarter))
+                }
+                (a, b) if k == 0 => (a.map(|q| Side::turned(orientation, q)), b.map(|q| Side::turned(orientation, q))),
+                (a, b) => {
+                    (a.map(|q| Side::turned(orientation, straight(q, q * DVec3::NEG_Z))), b.map(|q| Side::turned(orientation, straight(q, q * DVec3::Z))))
+                }
+            };
+            members.push(Member { rod, particle, before, after });
+        }
+        let mass: f64 = places.iter().map(|p| model.mass[p.2]).sum();
+        let velocity = places.iter().map(|p| state.velocity[p.2] * model.mass[p.2]).sum::<DVec3>() / mass;
+        let at = held.first().map_or(middle, |i| state.position[*i]);
+        for (_, _, i) in places {
+            (self.state.position[i], self.state.velocity[i]) = (at, velocity);
+        }
+        Ok(self.join(members, orientation))
+    }
+
+    /// Takes a weld apart. A thread that went through it goes on, ends are free.
+    pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
+        self.model.welds.remove(weld).ok_or(WELD)?;
+        self.refresh_welds();
+        Ok(())
+    }
+
+    /// The weld at a particle of a thread, such as the seam of a closed one.
+    pub fn weld_at(&self, rod: Handle<Rod>, particle: u32) -> Result<Option<Handle<Weld>>, Error> {
+        let r = self.model.rods.get(rod).ok_or(ROD)?;
+        crate::model::grip::Place::Particle(particle).validate("weld", &self.model, r)?;
+        Ok(self.model.weld_of[(r.first + particle) as usize].map(|slot| self.model.welds.handle(slot)))
+    }
+
+    fn join(&mut self, members: Vec<Member>, orientation: DQuat) -> Handle<Weld> {
+        let radius = members.iter().map(|m| self.radius_of(m.index(&self.model))).fold(0.0, f64::max);
+        let mut weld = WeldModel { members, exempt: core::f64::consts::PI * radius };
+        weld.exempt = crate::collide::exempt(&self.model, &self.state.position, &weld);
+        let handle: Handle<Weld> = self.model.welds.insert(weld);
+        self.state.weld_orientation.resize(self.model.welds.len(), DQuat::IDENTITY);
+        self.state.weld_orientation[handle.index()] = orientation;
+        self.refresh_welds();
+        handle
+    }
+
+    fn refresh_welds(&mut self) {
+        let model = &mut self.model;
+        model.weld_of.clear();
+        model.weld_of.resize(model.mass.len(), None);
+        for (slot, weld) in model.welds.iter() {
+            for member in &weld.members {
+                let first = model.rods.at(member.rod).expect("welds go with their rods").first;
+                model.weld_of[(first + member.particle) as usize] = Some(slot);
+            }
+        }
+    }
+
+    /// Whether a grip holds a particle.
+    fn is_held(&self, i: usize) -> bool {
+        self.state.grips.iter().any(|(_, g)| {
+            let first = (self.model.rods.at(g.rod).expect("grips go with their rod").first + g.index) as usize;
+            (first..=first + usize::from(g.hold == Hold::Jaw)).contains(&i)
+        })
     }
 
     /// Adds a shape.
@@ -228,7 +358,10 @@ impl World {
             Hold::Pin | Hold::Clamp => spec.place.particle(&self.model, rod),
             Hold::Jaw => (spec.place.on_element(&self.model, rod).0 - rod.first as usize) as u32,
         };
-        if self.state.grips.iter().any(|(_, g)| g.rod == spec.rod.index && nodes_overlap(g, spec.hold, index)) {
+        let first = (rod.first + index) as usize;
+        let wanted = first..=first + usize::from(spec.hold == Hold::Jaw);
+        let welded = wanted.clone().filter_map(|i| self.model.weld_of[i]).flat_map(|w| self.model.welds.at(w).into_iter().flat_map(|w| &w.members));
+        if wanted.clone().chain(welded.map(|m| m.index(&self.model))).any(|i| self.is_held(i)) {
             return Err(Error::invalid("grip", "place", spec.place, "a piece that no other grip holds"));
         }
         let i = (rod.first + index) as usize;
@@ -244,8 +377,9 @@ impl World {
                 if let Some(j) = joint {
                     rest_half = crate::math::half(self.model.rest_half[j]);
                 }
+                let welded = self.model.weld_of[i].map(|w| state.weld_orientation[w as usize]);
                 let q = crate::step::clamp_orientation(before.map(|e| state.orientation[e]), after.map(|e| state.orientation[e]), rest_half);
-                (state.position[i], q, state.velocity[i], state.angular_velocity[after.or(before).unwrap_or(i)])
+                (state.position[i], welded.unwrap_or(q), state.velocity[i], state.angular_velocity[after.or(before).unwrap_or(i)])
             }
             Hold::Jaw => {
                 let (a, b, q) = (state.position[i], state.position[i + 1], state.orientation[i]);
@@ -521,12 +655,15 @@ impl World {
         if lengths.iter().any(|l| *l != n) {
             return Err("it is of a world with other threads");
         }
+        if s.weld_orientation.len() != self.model.welds.len() {
+            return Err("it is of a world with other welds");
+        }
         if s.shape_pose.len() != self.model.shapes.len() || s.shape_target.len() != s.shape_pose.len() {
             return Err("it is of a world with other shapes");
         }
         let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.plastic);
         let finite = vectors.into_iter().all(|v| v.is_finite())
-            && s.orientation.iter().all(|q| (q.length() - 1.0).abs() < 1e-6)
+            && s.orientation.iter().chain(&s.weld_orientation).all(|q| (q.length() - 1.0).abs() < 1e-6)
             && s.tension.iter().chain(&s.hardened).all(|v| v.is_finite())
             && s.shape_pose.iter().chain(&s.shape_target).all(Pose::is_valid)
             && s.time.is_finite()
@@ -591,11 +728,4 @@ impl World {
 /// Stiffness of a joint: half an element of bending stiffness `a` and length `la` in series with half of the next.
 fn joined(a: DVec3, la: f64, b: DVec3, lb: f64) -> DVec3 {
     if a == b { a / (0.5 * (la + lb)) } else { (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip() }
-}
-
-/// Whether a grip and a new hold at `index` share a particle.
-fn nodes_overlap(grip: &GripState, hold: Hold, index: u32) -> bool {
-    let range = |hold: Hold, i: u32| if hold == Hold::Jaw { i..=i + 1 } else { i..=i };
-    let (a, b) = (range(grip.hold, grip.index), range(hold, index));
-    a.start() <= b.end() && b.start() <= a.end()
 }

@@ -23,7 +23,7 @@ impl Scene {
     fn show(&self, audit: &mut Audit, time: f64) {
         let rods = self.rods.iter().map(|(slot, radius, x, rest)| RodSlice { slot: *slot, radius: *radius, positions: x, rest_lengths: rest });
         let shapes = self.shapes.iter().map(|(slot, geometry, pose)| ShapeView { slot: *slot, geometry, pose: *pose });
-        audit.observe_slices(time, rods, shapes);
+        audit.observe_slices(time, rods, shapes, core::iter::empty());
     }
 }
 

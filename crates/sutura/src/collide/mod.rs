@@ -7,6 +7,7 @@ mod tree;
 pub(crate) use shape::{Collider, Distance};
 
 use crate::model::Model;
+use crate::model::weld::{Member, WeldModel};
 use crate::params;
 use crate::rod::lanes::Vec2;
 use crate::scratch::Scratch;
@@ -70,10 +71,54 @@ fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
 }
 
 /// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than half a turn of the
-/// thread's own radius.
+/// thread's own radius. Likewise by way of a weld.
 #[inline]
 fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> bool {
     arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] && model.rod_of[a] == model.rod_of[b]
+        || model.welds.iter().any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.exempt)
+}
+
+/// Rest arc between an element and a weld along its own thread; infinite where that is not joined there.
+fn way_to_weld(model: &Model, arc: &[f64], weld: &WeldModel, e: usize) -> f64 {
+    let way = |m: &Member| {
+        let to = arc[m.index(model)];
+        if m.rod == model.rod_of[e] { (to - arc[e + 1]).max(arc[e] - to).max(0.0) } else { f64::INFINITY }
+    };
+    weld.members.iter().map(way).fold(f64::INFINITY, f64::min)
+}
+
+/// Up to which way through a new weld elements of its threads do not touch: less than half a turn, or as far as they overlap there now because
+/// they run into each other at an acute angle.
+pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
+    // Where legs that meet at an angle a are a diameter apart they are r / sin(a / 2) long: 40 radii at 3 degrees.
+    const FARTHEST: f64 = 40.0;
+    let mut arc = Vec::new();
+    arcs(model, &mut arc);
+    let radius = |e: usize| model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius);
+    let near = |e: &usize| model.is_element(*e) && way_to_weld(model, &arc, weld, *e) < FARTHEST * radius(*e);
+    let legs: Vec<usize> = (0..model.mass.len()).filter(near).collect();
+    let mut exempt = weld.exempt;
+    for (k, a) in legs.iter().enumerate() {
+        for b in &legs[k + 1..] {
+            let own = model.rod_of[*a] == model.rod_of[*b] && arc[*b] - arc[*a + 1] < core::f64::consts::PI * radius(*a);
+            let apart = segment::closest(x[*a], x[*a + 1], x[*b], x[*b + 1]).apart.length();
+            if !own && apart < (radius(*a) + radius(*b)) * (1.0 + params::KEEP) {
+                let way = way_to_weld(model, &arc, weld, *a) + way_to_weld(model, &arc, weld, *b);
+                exempt = exempt.max(way + 0.01 * radius(*a));
+            }
+        }
+    }
+    exempt
+}
+
+/// Rest arc of each particle from the start of its rod.
+fn arcs(model: &Model, arc: &mut Vec<f64>) {
+    arc.clear();
+    for e in 0..model.mass.len() {
+        let fresh = e == 0 || !model.is_element(e - 1);
+        let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
+        arc.push(s);
+    }
 }
 
 /// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
@@ -82,12 +127,7 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { candidates, start, radius, .. } = scratch;
     let Candidates { threads, shapes, arc, tree, turned, straight } = candidates;
     let n = model.mass.len();
-    arc.clear();
-    for e in 0..n {
-        let fresh = e == 0 || !model.is_element(e - 1);
-        let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
-        arc.push(s);
-    }
+    arcs(model, arc);
     turning(model, [start, &state.position], turned);
     straight.clear();
     let mut last = 0;

@@ -5,6 +5,7 @@ pub mod material;
 pub mod rod;
 pub mod section;
 pub mod shape;
+pub mod weld;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
@@ -12,6 +13,7 @@ use glam::{DQuat, DVec3};
 use material::SectionStiffness;
 use rod::RodModel;
 use shape::{Geometry, ShapeMotion};
+use weld::WeldModel;
 
 /// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last element entry
 /// of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
@@ -20,6 +22,7 @@ pub struct Model {
     pub(crate) settings: Settings,
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
+    pub(crate) welds: Slots<WeldModel>,
     /// Friction of pairs of surfaces, smaller index first, sorted.
     pub(crate) friction: Vec<((u32, u32), Friction)>,
 
@@ -27,6 +30,8 @@ pub struct Model {
     pub(crate) mass: Vec<f64>,
     /// Slot of the rod of each particle and element.
     pub(crate) rod_of: Vec<u32>,
+    /// Slot of the weld that each particle belongs to.
+    pub(crate) weld_of: Vec<Option<u32>>,
 
     /// Rest length of each element \[m\].
     pub(crate) rest_length: Vec<f64>,

@@ -1,7 +1,7 @@
 //! What a user says of a thread, and the checked, lowered form that the solver reads.
 
 use crate::error::{Error, check};
-use crate::math::{exp, frame_from_tangent, half, rotation_arc};
+use crate::math::{exp, frame_from_tangent, half, log, rotation_arc};
 use crate::model::material::{Material, SectionStiffness};
 use crate::model::section::{Along, Section};
 use glam::{DQuat, DVec3};
@@ -13,7 +13,8 @@ pub enum Rod {}
 /// A thread to insert.
 #[derive(Debug, Clone)]
 pub struct RodSpec {
-    /// Particles along the centerline in the world \[m\], at least two, no two neighbors at one place.
+    /// Particles along the centerline in the world \[m\], at least two, no two neighbors at one place. A closed thread has at least three, and goes
+    /// on from the last to the first.
     pub centerline: Vec<DVec3>,
     /// Material frame of each element, `world_from_material`, third director along the element. `None`: transported without
     /// twist from the first, whose first director is the across direction nearest to the normal of the first bend.
@@ -32,6 +33,8 @@ pub struct RodSpec {
     pub along: Along,
     /// What it is made of.
     pub material: Material,
+    /// Whether its end is joined to its start.
+    pub closure: Option<Closure>,
     /// Whether the centerline may stretch.
     pub stretch: Stretch,
     /// Surface for friction, an index of the user's choice (see [`World::set_friction`](crate::World::set_friction)).
@@ -49,9 +52,18 @@ pub enum RestShape {
     Given {
         /// Rest length of each element \[m\], > 0; `None` takes them from `centerline`.
         lengths: Option<Vec<f64>>,
-        /// Rest Darboux vector of each joint between neighboring elements \[rad/m\]; `None` is straight and untwisted.
+        /// Rest Darboux vector of each joint between neighboring elements \[rad/m\], of a closed thread with the one from the last to the first at
+        /// the end; `None` is straight and untwisted.
         darboux: Option<Vec<DVec3>>,
     },
+}
+
+/// How the end of a thread is joined to its start. The seam is as stiff as any other joint; it takes no plastic set.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Closure {
+    /// Angle by which the thread is twisted before its ends are joined \[rad\]: moment, spread evenly. Positive is the right-hand rotation of the
+    /// end against the start.
+    pub twist: f64,
 }
 
 /// Whether the centerline stretches.
@@ -76,6 +88,7 @@ impl RodSpec {
             pretwist: 0.0,
             along: Along::default(),
             material,
+            closure: None,
             stretch: Stretch::Elastic,
             surface: 0,
         }
@@ -86,6 +99,18 @@ impl RodSpec {
         let n = n_elements.max(1);
         let points = (0..=n).map(|i| from.lerp(to, i as f64 / n as f64)).collect();
         Self::new(points, radius, material)
+    }
+
+    /// A closed, straight-rest thread of `n_elements` equal elements along a circle about the axis `axis` (unit) through `center`, beginning at
+    /// `center + start` (`start` across the axis, its length is the radius of the circle).
+    pub fn ring(center: DVec3, axis: DVec3, start: DVec3, n_elements: usize, radius: f64, material: Material) -> Self {
+        let other = axis.cross(start);
+        let n = n_elements.max(3);
+        let at = |i: usize| {
+            let (s, c) = libm::sincos(core::f64::consts::TAU * i as f64 / n as f64);
+            center + start * c + other * s
+        };
+        RodSpec { closure: Some(Closure::default()), ..Self::new((0..n).map(at).collect(), radius, material) }
     }
 
     /// Equal elements on a helix about the axis `axis` (unit) through `center`, starting at `center + start` (`start` across the
@@ -150,6 +175,10 @@ impl RodModel {
 
 /// The parts of a rod that go into the world's arrays, checked.
 pub(crate) struct Lowered {
+    /// Of a closed thread with the first once more at the end.
+    pub centerline: Vec<DVec3>,
+    /// Of a closed thread: square roots of the rest rotations from the last frame to the seam and from there to the first.
+    pub seam: Option<[DQuat; 2]>,
     pub rest_lengths: Vec<f64>,
     /// Square root of the rest rotation of each joint; entry j is between frames j-1 and j (entry 0 unused, identity).
     pub rest_half: Vec<DQuat>,
@@ -171,10 +200,13 @@ impl RodSpec {
         self.along.validate()?;
         check(what, "roll", self.roll, true, "a finite angle [rad]")?;
         check(what, "pretwist", self.pretwist, true, "a finite angle [rad]")?;
-        let points = &self.centerline;
-        if points.len() < 2 {
-            return Err(Error::invalid(what, "centerline", format!("{} points", points.len()), "at least 2 points"));
+        let closed = self.closure.is_some();
+        if self.centerline.len() < if closed { 3 } else { 2 } {
+            return Err(Error::invalid(what, "centerline", format!("{} points", self.centerline.len()), "at least 2 points, 3 of a closed thread"));
         }
+        let mut points = self.centerline.clone();
+        points.extend(closed.then(|| points[0]));
+        let points = &points;
         for (i, p) in points.iter().enumerate() {
             if !p.is_finite() {
                 return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates [m]"));
@@ -204,16 +236,28 @@ impl RodSpec {
             }
             None => {
                 let bend = points.windows(3).map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize())).find(|c| c.length() > 1e-6);
-                transported_frames(points, bend.unwrap_or(DVec3::ZERO))
+                let mut frames = transported_frames(points, bend.unwrap_or(DVec3::ZERO));
+                if closed {
+                    // What the frames lack to meet at the seam is spread over all joints.
+                    let (last, first) = (frames[n - 1], frames[0]);
+                    let carried = rotation_arc(last * DVec3::Z, first * DVec3::Z) * last;
+                    let lack = log(carried.conjugate() * first).z;
+                    for (e, q) in frames.iter_mut().enumerate() {
+                        *q = (*q * exp(DVec3::Z * (lack * e as f64 / n as f64))).normalize();
+                    }
+                }
+                frames
             }
         };
         let own_lengths = || (0..n).map(|i| (points[i + 1] - points[i]).length()).collect::<Vec<_>>();
         let mut rest_half = vec![DQuat::IDENTITY; n];
+        // Entry 0 is the seam's.
+        let first_joint = usize::from(!closed);
         let rest_lengths = match &self.rest {
             RestShape::Straight => own_lengths(),
             RestShape::AsInserted => {
-                for j in 1..n {
-                    rest_half[j] = half(frames[j - 1].conjugate() * frames[j]);
+                for j in first_joint..n {
+                    rest_half[j] = half(frames[(j + n - 1) % n].conjugate() * frames[j]);
                 }
                 own_lengths()
             }
@@ -229,13 +273,14 @@ impl RodSpec {
                     None => own_lengths(),
                 };
                 if let Some(d) = darboux {
-                    if d.len() + 1 != n {
+                    if d.len() + first_joint != n {
                         return Err(Error::invalid(what, "rest.darboux", format!("{} joints", d.len()), "one for each joint between neighboring elements"));
                     }
-                    for j in 1..n {
-                        let phi = d[j - 1] * (0.5 * (lengths[j - 1] + lengths[j]));
+                    for j in first_joint..n {
+                        let before = (j + n - 1) % n;
+                        let phi = d[before] * (0.5 * (lengths[before] + lengths[j]));
                         if !(phi.is_finite() && phi.length() < 3.0) {
-                            return Err(Error::invalid(what, format!("rest.darboux[{}]", j - 1), d[j - 1], "finite, under 3 rad per element"));
+                            return Err(Error::invalid(what, format!("rest.darboux[{before}]"), d[before], "finite, under 3 rad per element"));
                         }
                         rest_half[j] = exp(phi * 0.5);
                     }
@@ -253,13 +298,27 @@ impl RodSpec {
         if self.roll != 0.0 || self.pretwist != 0.0 {
             let rate = self.pretwist / rest_lengths.iter().sum::<f64>();
             let turn: Vec<DQuat> = middles.iter().map(|s| exp(DVec3::Z * (self.roll + rate * s))).collect();
-            for j in 1..n {
-                let angle = rate * (middles[j] - middles[j - 1]);
+            for j in first_joint..n {
+                let before = (j + n - 1) % n;
+                let angle = if j == 0 { 0.0 } else { rate * (middles[j] - middles[before]) };
                 check(what, "pretwist", self.pretwist, angle.is_finite() && angle.abs() < 3.0, "under 3 rad per element")?;
-                rest_half[j] = half((turn[j - 1].conjugate() * (rest_half[j] * rest_half[j]) * turn[j]).normalize());
+                rest_half[j] = half((turn[before].conjugate() * (rest_half[j] * rest_half[j]) * turn[j]).normalize());
             }
             for (frame, turn) in frames.iter_mut().zip(&turn) {
                 *frame = (*frame * *turn).normalize();
+            }
+        }
+        let seam = self.closure.map(|c| {
+            // The seam lies half of the twist before the first frame and half of it after the last.
+            let (h, turn) = (rest_half[0], exp(DVec3::Z * (-0.5 * c.twist)));
+            [half(h * turn), half(turn * h)]
+        });
+        rest_half[0] = DQuat::IDENTITY;
+        if let Some(Closure { twist }) = self.closure {
+            let length: f64 = rest_lengths.iter().sum();
+            check(what, "closure.twist", twist, (twist / n as f64).abs() < 3.0, "a finite angle under 3 rad per element [rad]")?;
+            for (q, s) in frames.iter_mut().zip(&middles) {
+                *q = (*q * exp(DVec3::Z * (twist * s / length))).normalize();
             }
         }
         let sections: Vec<_> = middles.iter().map(|s| SectionStiffness::new(&self.material, &self.section, self.radius, &self.along, *s)).collect();
@@ -271,6 +330,6 @@ impl RodSpec {
         if self.material.plasticity.is_some() && flat {
             return Err(Error::invalid(what, "material.plasticity", self.section, "no plasticity for a section that is stiffer one way than the other"));
         }
-        Ok(Lowered { rest_lengths, rest_half, frames, sections, flat, radius: self.radius * self.along.size.largest() })
+        Ok(Lowered { centerline: points.clone(), seam, rest_lengths, rest_half, frames, sections, flat, radius: self.radius * self.along.size.largest() })
     }
 }

@@ -32,6 +32,18 @@ pub(crate) fn joint_angle(model: &Model, state: &State, e: usize) -> DVec3 {
     strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]) - state.plastic[e]
 }
 
+/// Elastic angles of the two half joints by which a rod goes on through a weld, as it is at particle `e` (the first or last of a closed rod), and
+/// their stiffness.
+pub(crate) fn welded_joint(model: &Model, state: &State, rod: &RodModel, e: usize) -> impl Iterator<Item = (DVec3, DVec3)> {
+    let slot = model.weld_of[e];
+    let weld = slot.and_then(|s| model.welds.at(s));
+    let halves = weld.into_iter().flat_map(|w| w.halves(model)).filter(|half| rod.elements().contains(&half.frame));
+    halves.map(move |half| {
+        let (q, node) = (state.orientation[half.frame], state.weld_orientation[slot.expect("there is a weld") as usize]);
+        (half.angle(node, q), model.section[half.frame].bend / (0.5 * model.rest_length[half.frame]))
+    })
+}
+
 /// Mechanical energy of a rod.
 pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
     let mut sum = Energy::default();
@@ -48,11 +60,21 @@ pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
             k.z = 0.0;
         }
         sum.stretch += 0.5 * (k * c).dot(c);
-        if model.is_joint(e) {
-            let (a, b) = (joint_angle(model, state, e), model.bend_stiffness[e]);
-            sum.bend += 0.5 * (b.x * a.x * a.x + b.y * a.y * a.y);
-            sum.twist += 0.5 * b.z * a.z * a.z;
+        if model.is_joint(e) && model.weld_of[e].is_none() {
+            add_joint(&mut sum, joint_angle(model, state, e), model.bend_stiffness[e]);
+        }
+    }
+    // Each weld once, also where it joins the rod to itself.
+    for (_, weld) in model.welds.iter() {
+        let first = weld.members.iter().map(|m| m.index(model)).find(|i| rod.particles().contains(i));
+        for (a, b) in first.into_iter().flat_map(|e| welded_joint(model, state, rod, e)) {
+            add_joint(&mut sum, a, b);
         }
     }
     sum
+}
+
+fn add_joint(sum: &mut Energy, angle: DVec3, stiffness: DVec3) {
+    sum.bend += 0.5 * (stiffness.x * angle.x * angle.x + stiffness.y * angle.y * angle.y);
+    sum.twist += 0.5 * stiffness.z * angle.z * angle.z;
 }

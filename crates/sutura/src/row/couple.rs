@@ -41,6 +41,18 @@ impl Endpoint {
         Endpoint { element, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
     }
 
+    /// Only what acts on free directions of its nodes.
+    fn on_free(&self, freedom: &[Freedom]) -> Endpoint {
+        let mut free = *self;
+        let k = 2 * self.element;
+        for (node, columns) in [(k, &mut free.here.x), (k + 1, &mut free.here.t), (k + 2, &mut free.next)] {
+            if freedom[node] != Freedom::Free {
+                *columns = freedom[node].projector() * *columns;
+            }
+        }
+        free
+    }
+
     fn push(&self, force: DVec3, right: &mut [DVec3]) {
         right[2 * self.element] += self.here.x * force;
         right[2 * self.element + 1] += self.here.t * force;
@@ -60,7 +72,7 @@ pub(crate) struct Entry {
     /// The second counts only with `two`: a shape's side has no rod behind it.
     pub ends: [Endpoint; 2],
     pub two: bool,
-    /// A pushed shape's number and what a unit move of it adds to the three components.
+    /// A pushed shape's unknown and what a unit move of it adds to the three components.
     pub slider: Option<(usize, DVec3)>,
     /// Gap, and slip still to undo, that the step without contact forces would leave \[m\].
     pub free: DVec3,
@@ -98,7 +110,7 @@ pub(crate) struct Coupling {
     force: Vec<f64>,
     cone: Cone,
     right: Vec<DVec3>,
-    /// Response of each component to the pushed shapes.
+    /// Response of each component to what rods share.
     reach: Vec<f64>,
     small: Vec<f64>,
     /// Residual of the last solution, in radii.
@@ -128,12 +140,12 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let Scratch { rods, rows, system, step, start, start_frame, start_shape_pose, .. } = scratch;
+    let Scratch { rods, rows, system, step, freedom, start, start_frame, start_shape_pose, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
     entries.clear();
     thread::enter(state, &start, step, &mut rows.threads, entries);
-    shape::enter(state, &start, step, &mut rows.shapes, &rows.sliders, entries);
+    shape::enter(state, &start, step, &mut rows.shapes, (&rows.sliders, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
@@ -154,7 +166,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         endpoints.clear();
         for (k, entry) in entries.iter().enumerate() {
             let inside = |p: &&Endpoint| zone.contains(&p.element) && p.element + 1 < zone.end;
-            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: *at }));
+            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: at.on_free(freedom) }));
         }
         if endpoints.is_empty() {
             continue;
@@ -181,8 +193,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         }
         compliance_between(system, endpoints, blocks, jumps, s, n);
     }
-    // What gives way with the pushed shapes: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape itself moves.
-    let m = rows.sliders.count();
+    // What gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld itself moves.
+    let m = rows.border.count();
     if m > 0 {
         reach.clear();
         for entry in entries.iter() {
@@ -190,14 +202,14 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
                 let unit = DVec3::AXES[axis];
                 for k in 0..m {
                     let own = entry.slider.map_or(0.0, |(j, d)| if j == k { d[axis] } else { 0.0 });
-                    reach.push(entry.ends().iter().map(|p| p.work(unit, rows.sliders.response(k))).sum::<f64>() - own);
+                    reach.push(entry.ends().iter().map(|p| p.work(unit, rows.border.response(k))).sum::<f64>() - own);
                 }
             }
         }
         for i in 0..n {
             small.clear();
             small.extend_from_slice(&reach[i * m..(i + 1) * m]);
-            rows.sliders.solve_small(small);
+            rows.border.solve_small(small);
             for j in i..n {
                 s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
             }
@@ -223,22 +235,23 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             p.push(entry.force, right);
         }
         if let Some((slider, direction)) = entry.slider {
-            rows.sliders.load(slider, direction.dot(entry.force));
+            rows.border.load(slider, direction.dot(entry.force));
         }
         match entry.source {
             Source::Thread(k) => rows.threads[k as usize].force = entry.force,
             Source::Shape(k) => rows.shapes[k as usize].solved(entry.force),
         }
     }
-    for (node, r) in right.iter_mut().enumerate() {
-        if scratch.freedom[node] != Freedom::Free {
-            *r = scratch.freedom[node].projector() * *r;
+    rows.border.load_carried(right);
+    for (r, freedom) in right.iter_mut().zip(freedom.iter()) {
+        if *freedom != Freedom::Free {
+            *r = freedom.projector() * *r;
         }
     }
     for (rod, zone) in rods.iter() {
         system.solve(rod.clone(), zone, right);
     }
-    rows.sliders.couple(right, true);
+    rows.border.couple(right, true);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
     }
@@ -261,7 +274,9 @@ pub(crate) fn add_forces(scratch: &mut Scratch) {
 
 /// Work of the entries' forces along the step.
 pub(crate) fn work(scratch: &Scratch) -> f64 {
-    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, &scratch.step)).sum::<f64>();
+    let border = &scratch.rows.border;
+    let pushed = |e: &Entry| e.slider.map_or(0.0, |(k, d)| d.dot(e.force) * border.step(k));
+    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, &scratch.step)).sum::<f64>() + pushed(e);
     scratch.rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
 }
 

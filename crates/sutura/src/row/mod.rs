@@ -1,11 +1,14 @@
-//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`]: firm in the rods' matrix, light in the small problem).
+//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape ([`shape`]: firm in the rods' matrix, light in the
+//! small problem). And what rods share, at the [`border`] of their system: pushed shapes and welds.
 
+pub(crate) mod border;
 pub(crate) mod cone;
 pub(crate) mod couple;
 pub(crate) mod ldl;
 pub(crate) mod pushed;
 pub(crate) mod shape;
 pub(crate) mod thread;
+pub(crate) mod weld;
 
 use crate::math::Pose;
 use glam::{DQuat, DVec3};
@@ -23,6 +26,8 @@ pub(crate) struct Rows {
     pub shapes: Vec<shape::ShapeRow>,
     pub threads: Vec<thread::ThreadRow>,
     pub sliders: pushed::Sliders,
+    pub welds: weld::Welds,
+    pub border: border::Border,
     pub solver: couple::Coupling,
     fresh: Vec<thread::ThreadRow>,
 }

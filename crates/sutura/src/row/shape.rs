@@ -25,6 +25,7 @@ use crate::model::Model;
 use crate::model::shape::ShapeMotion;
 use crate::params;
 use crate::row::Start;
+use crate::row::border::Border;
 use crate::row::couple::{Endpoint, Entry, Source};
 use crate::row::pushed::Sliders;
 use crate::scratch::Scratch;
@@ -316,7 +317,8 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
 /// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, first: bool) {
     let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
-    rows.sliders.clear(model, state, start_shape_pose, h);
+    rows.border.clear(rows.sliders.count() + rows.welds.count());
+    rows.sliders.assemble(model, state, start_shape_pose, h, &mut rows.border);
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in &mut rows.shapes {
         if !row.firm {
@@ -341,42 +343,41 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
         system.next[2 * e] += kt * a;
         system.next[2 * e + 1] += kt.transpose() * b;
         system.diagonal[2 * e + 1] += turn.transpose() * kt;
-        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &turn);
+        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &turn, &mut rows.border);
         row.tangent = stiffness;
     }
 }
 
 /// Move of a row's surface point against its shape along the last step.
-fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders) -> DVec3 {
+fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders, border: &Border) -> DVec3 {
     let e = row.element as usize;
     let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
-    let pushed = sliders.find(row.shape).map_or(DVec3::ZERO, |j| sliders.direction(j) * sliders.step(j));
-    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s + turned.cross(row.normal * -row.radius) - pushed
+    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s + turned.cross(row.normal * -row.radius) - sliders.moved(row.shape, border)
 }
 
 /// Notes the forces that a step of this length predicts for the firm rows.
 pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
     let Scratch { rows, step, .. } = scratch;
-    let sliders = &rows.sliders;
+    let (sliders, border) = (&rows.sliders, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
-        row.expected = row.normal * row.normal_force + row.friction - row.tangent * moved(row, step, sliders) * scale;
+        row.expected = row.normal * row.normal_force + row.friction - row.tangent * moved(row, step, sliders, border) * scale;
     }
 }
 
 /// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
 pub(crate) fn work_unforeseen(scratch: &Scratch) -> f64 {
     let Scratch { rows, step, .. } = scratch;
-    let on = |row: &ShapeRow| (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders));
+    let on = |row: &ShapeRow| (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders, &rows.border));
     rows.shapes.iter().filter(|r| r.firm).map(on).sum()
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ShapeRow], sliders: &Sliders, entries: &mut Vec<Entry>) {
+pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ShapeRow], shared: (&Sliders, &Border), entries: &mut Vec<Entry>) {
+    let (sliders, border) = shared;
     for (k, row) in rows.iter_mut().enumerate().filter(|(_, r)| !r.firm) {
         let e = row.element as usize;
         let slider = sliders.find(row.shape);
-        let pushed = slider.map_or(DVec3::ZERO, |j| sliders.direction(j) * sliders.step(j));
-        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - pushed;
+        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - sliders.moved(row.shape, border);
         let gap = row.gap + row.normal.dot(moved);
         if row.normal_force <= 0.0 && !row.wanted && gap > params::PRUNE * row.radius {
             (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
@@ -417,7 +418,7 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, iterations: u32) -> bool {
     let Scratch { rows, start, start_frame, start_shape_pose, step, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
-    let sliders = &rows.sliders;
+    let (sliders, border) = (&rows.sliders, &rows.border);
     let mut settled = true;
     // Rod by rod: what a taut one bears says nothing about a light one.
     for rows in rows.shapes.chunk_by_mut(|a, b| model.rod_of[a.element as usize] == model.rod_of[b.element as usize]) {
@@ -433,7 +434,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 let normal_force = (row.normal_force - row.stiffness * (now.gap - row.gap)).max(0.0);
                 let off = (now.normal_force - normal_force).abs().max((now.friction - friction).length());
                 // Where one after another goes over its limit the last digit would take an iteration each.
-                let front = iterations > params::FRONT && moved(row, step, sliders).length() < params::SLIP * row.radius;
+                let front = iterations > params::FRONT && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
                 look(model, state, &mut now);

@@ -26,6 +26,8 @@ pub struct State {
     /// Plastic arc already travelled by each joint, for hardening \[rad\].
     pub(crate) hardened: Vec<f64>,
 
+    /// Cross-section of each weld, `world_from_weld`.
+    pub(crate) weld_orientation: Vec<DQuat>,
     pub(crate) shape_pose: Vec<Pose>,
     /// Where the user wants each driven shape at the end of the next step.
     pub(crate) shape_target: Vec<Pose>,
@@ -120,6 +122,7 @@ impl State {
             tension,
             plastic,
             hardened,
+            weld_orientation,
             shape_pose,
             shape_target,
             grips,
@@ -137,6 +140,7 @@ impl State {
         self.tension.clone_from(tension);
         self.plastic.clone_from(plastic);
         self.hardened.clone_from(hardened);
+        self.weld_orientation.clone_from(weld_orientation);
         self.shape_pose.clone_from(shape_pose);
         self.shape_target.clone_from(shape_target);
         self.grips.copy_from(grips);

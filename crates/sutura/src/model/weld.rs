@@ -1,0 +1,127 @@
+//! Places of threads that are joined: a ring closed, a branch, a splice.
+
+use crate::error::Error;
+use crate::handle::Handle;
+use crate::model::Model;
+use crate::model::grip::Place;
+use crate::model::rod::Rod;
+use crate::rod::strain::joint_angle;
+use glam::{DQuat, DVec3};
+
+/// A weld. Marker of [`Handle`].
+#[derive(Debug)]
+pub enum Weld {}
+
+/// Places to join. They become one cross-section: one point with one orientation, which every thread there holds as a clamp does, with half an
+/// element of its own compliance on each side.
+#[derive(Debug, Clone)]
+pub struct WeldSpec {
+    /// The places, at least two; ends or inner particles, no place twice. They lie within a tenth of the smallest radius of each other.
+    pub places: Vec<(Handle<Rod>, Place)>,
+    /// Shape of the joint when nothing acts on it.
+    pub rest: WeldRest,
+}
+
+/// Shape of a weld at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WeldRest {
+    /// The directions in which threads end there now are free of moment. A thread that goes on through the weld keeps its own rest shape.
+    AsInserted,
+    /// Two ends that go on straight into each other, without moment where their directions agree; turned about their direction as they are now.
+    Straight,
+}
+
+/// A weld, checked.
+#[derive(Debug, Clone)]
+pub(crate) struct WeldModel {
+    pub members: Vec<Member>,
+    /// Elements of joined threads that are nearer to each other by way of the weld than this do not touch \[m\].
+    pub exempt: f64,
+}
+
+/// A thread at a weld.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Member {
+    /// Slot of the thread, and the particle counted from its start.
+    pub rod: u32,
+    pub particle: u32,
+    /// What its frames before and after the place hold on to.
+    pub before: Option<Side>,
+    pub after: Option<Side>,
+}
+
+/// How a thread leaves a weld on one side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Side {
+    /// The thread's own cross-section there, `weld_from_section`, so that the half joint bends and twists about its own directions.
+    pub section: DQuat,
+    /// Square root of the rest rotation over the half element beside it.
+    pub rest_half: DQuat,
+}
+
+/// Half a joint between a weld and a frame.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Half {
+    /// Element of the frame in the world's arrays.
+    pub frame: usize,
+    /// The weld comes before the frame along the thread.
+    pub first: bool,
+    pub side: Side,
+}
+
+impl WeldModel {
+    /// Its half joints, member by member.
+    pub fn halves<'a>(&'a self, model: &'a Model) -> impl Iterator<Item = Half> + 'a {
+        self.members.iter().flat_map(|m| m.halves(model))
+    }
+}
+
+impl Member {
+    /// Its particle in the world's arrays.
+    pub fn index(&self, model: &Model) -> usize {
+        (model.rods.at(self.rod).expect("welds go with their rods").first + self.particle) as usize
+    }
+    pub fn halves(&self, model: &Model) -> impl Iterator<Item = Half> + use<> {
+        let i = self.index(model);
+        let before = self.before.map(|side| Half { frame: i - 1, first: false, side });
+        before.into_iter().chain(self.after.map(|side| Half { frame: i, first: true, side }))
+    }
+}
+
+impl Side {
+    /// With the cross-section of the weld.
+    pub fn along(rest_half: DQuat) -> Self {
+        Side { section: DQuat::IDENTITY, rest_half }
+    }
+    /// At rest where its frame is now.
+    pub fn turned(weld: DQuat, frame: DQuat) -> Self {
+        Side { section: (weld.conjugate() * frame).normalize(), rest_half: DQuat::IDENTITY }
+    }
+}
+
+impl Half {
+    /// Elastic angle \[rad\] for the orientations of the weld and of its frame.
+    pub fn angle(&self, weld: DQuat, frame: DQuat) -> DVec3 {
+        let section = weld * self.side.section;
+        let (a, b) = if self.first { (section, frame) } else { (frame, section) };
+        joint_angle(a, b, self.side.rest_half)
+    }
+}
+
+impl WeldSpec {
+    /// Joins ends or inner particles as they lie.
+    pub fn new(places: Vec<(Handle<Rod>, Place)>) -> Self {
+        WeldSpec { places, rest: WeldRest::AsInserted }
+    }
+    /// Splices two ends so that they go on straight into each other.
+    pub fn splice(a: (Handle<Rod>, Place), b: (Handle<Rod>, Place)) -> Self {
+        WeldSpec { places: vec![a, b], rest: WeldRest::Straight }
+    }
+
+    pub(crate) fn validate(&self) -> Result<(), Error> {
+        if self.places.len() < 2 || self.rest == WeldRest::Straight && self.places.len() != 2 {
+            return Err(Error::invalid("weld", "places", self.places.len(), "at least two places; two where they go on straight"));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,181 @@
+//! Unknowns that several rods share: where a pushed shape is on its line, where a weld is and how it is turned. They border the rods' system,
+//!
+//! ```text
+//! [ H   B ] [dz]   [r]
+//! [ B^T D ] [dy] = [s]
+//! ```
+//!
+//! and are eliminated last: `dy = (D - B^T H^-1 B)^-1 (s - B^T z)`, `dz = z - H^-1 B dy` with `z = H^-1 r`. What an unknown is and which forces
+//! act on it is in [`pushed`](crate::row::pushed) and [`weld`](crate::row::weld).
+
+use crate::math::solve_dense;
+use crate::rod::factor::System;
+use crate::row::ldl::Ldl;
+use crate::scratch::Freedom;
+use core::ops::Range;
+use glam::DVec3;
+
+/// One unknown.
+#[derive(Default)]
+struct Column {
+    /// Its column of B, node by node; a node may come more than once.
+    links: Vec<(usize, DVec3)>,
+    /// Places that move with it: nodes without an unknown of their own.
+    carried: Vec<(usize, DVec3)>,
+    /// H^-1 B, and minus the motion of what it carries: what a unit of it takes away from z.
+    response: Vec<DVec3>,
+    /// Force on it, and that of the small contact problem.
+    right: f64,
+    load: f64,
+    /// Its change in this Newton iteration.
+    step: f64,
+}
+
+/// The shared unknowns of a Newton iteration.
+#[derive(Default)]
+pub(crate) struct Border {
+    columns: Vec<Column>,
+    count: usize,
+    /// D, and the Schur complement, row after row.
+    own: Vec<f64>,
+    schur: Vec<f64>,
+    /// The factor of the Schur complement where it is positive.
+    factor: Ldl,
+    positive: bool,
+    dense: Vec<f64>,
+    small: Vec<f64>,
+}
+
+impl Border {
+    /// Makes `count` unknowns that nothing links or pushes. Their last steps, and the contact forces found in them, are kept.
+    pub fn clear(&mut self, count: usize) {
+        if self.columns.len() < count {
+            self.columns.resize_with(count, Column::default);
+        }
+        self.count = count;
+        for c in &mut self.columns[..count] {
+            c.links.clear();
+            c.carried.clear();
+            c.right = 0.0;
+        }
+        self.own.clear();
+        self.own.resize(count * count, 0.0);
+    }
+
+    pub fn count(&self) -> usize {
+        self.count
+    }
+    /// Adds `v` to the coupling of unknown `k` with a node.
+    pub fn link(&mut self, k: usize, node: usize, v: DVec3) {
+        self.columns[k].links.push((node, v));
+    }
+    /// Couplings of unknown `k` with nodes so far.
+    pub fn links_mut(&mut self, k: usize) -> &mut Vec<(usize, DVec3)> {
+        &mut self.columns[k].links
+    }
+    /// A node that moves by `v` with each unit of unknown `k`.
+    pub fn carry(&mut self, k: usize, node: usize, v: DVec3) {
+        self.columns[k].carried.push((node, v));
+    }
+    /// Adds to the coupling of two unknowns, in one direction.
+    pub fn add_own(&mut self, i: usize, j: usize, v: f64) {
+        self.own[i * self.count + j] += v;
+    }
+    /// Adds a force to the right side of unknown `k`.
+    pub fn push(&mut self, k: usize, force: f64) {
+        self.columns[k].right += force;
+    }
+    /// Adds a force of the small contact problem.
+    pub fn load(&mut self, k: usize, force: f64) {
+        self.columns[k].load += force;
+    }
+    /// Adds those on the nodes that the unknowns carry.
+    pub fn load_carried(&mut self, right: &[DVec3]) {
+        for c in &mut self.columns[..self.count] {
+            c.load += inner(&c.carried, right);
+        }
+    }
+    /// Change of unknown `k` in this Newton iteration so far.
+    pub fn step(&self, k: usize) -> f64 {
+        self.columns[k].step
+    }
+    /// What a unit of unknown `k` takes away from the step of the rods.
+    pub fn response(&self, k: usize) -> &[DVec3] {
+        &self.columns[k].response
+    }
+
+    /// Takes what is held out of B and finds the responses; the rods' system is factored. False when the whole is not positive definite.
+    pub fn factor(&mut self, system: &System, rods: &[(Range<usize>, Range<usize>)], freedom: &[Freedom]) -> bool {
+        let n = self.count;
+        for c in &mut self.columns[..n] {
+            c.response.clear();
+            c.response.resize(freedom.len(), DVec3::ZERO);
+            for (node, v) in &mut c.links {
+                if freedom[*node] != Freedom::Free {
+                    *v = freedom[*node].projector() * *v;
+                }
+                c.response[*node] += *v;
+            }
+            for (rod, zone) in rods {
+                if c.response[2 * rod.start..2 * rod.end].iter().any(|v| *v != DVec3::ZERO) {
+                    system.solve(rod.clone(), zone, &mut c.response);
+                }
+            }
+            for (node, v) in &c.carried {
+                c.response[*node] = -*v;
+            }
+        }
+        self.schur.clear();
+        for i in 0..n {
+            for j in 0..n {
+                self.schur.push(self.own[i * n + j] - inner(&self.columns[i].links, &self.columns[j].response));
+            }
+        }
+        self.factor.clear();
+        self.positive = (0..n).all(|i| self.factor.push(self.schur[i * n..i * n + i + 1].iter().copied()));
+        self.positive
+    }
+
+    /// `schur^-1 v` for a vector over the unknowns. False when there is none.
+    pub fn solve_small(&mut self, v: &mut [f64]) -> bool {
+        if self.positive {
+            self.factor.solve(v);
+            return true;
+        }
+        self.dense.clone_from(&self.schur);
+        solve_dense(&mut self.dense, v, self.count)
+    }
+
+    /// Couples a solution `z` of the rods alone with the unknowns under their own forces, or under those of the small contact problem.
+    pub fn couple(&mut self, z: &mut [DVec3], contacts: bool) {
+        let n = self.count;
+        if n == 0 {
+            return;
+        }
+        let mut small = core::mem::take(&mut self.small);
+        small.clear();
+        small.extend(self.columns[..n].iter().map(|c| if contacts { c.load } else { c.right } - inner(&c.links, z)));
+        if !self.solve_small(&mut small) {
+            small.fill(0.0);
+        }
+        {
+            for (c, y) in self.columns[..n].iter_mut().zip(&small) {
+                c.step = if contacts { c.step + y } else { *y };
+                c.load = 0.0;
+                for (z, r) in z.iter_mut().zip(&c.response) {
+                    *z -= *r * *y;
+                }
+            }
+        }
+        self.small = small;
+    }
+
+    /// Work of the forces on the unknowns, without those of the small contact problem, along their last step.
+    pub fn work(&self) -> f64 {
+        self.columns[..self.count].iter().map(|c| c.right * c.step).sum()
+    }
+}
+
+fn inner(links: &[(usize, DVec3)], z: &[DVec3]) -> f64 {
+    links.iter().map(|(node, v)| v.dot(z[*node])).sum()
+}

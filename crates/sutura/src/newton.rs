@@ -10,7 +10,7 @@ use crate::model::Model;
 use crate::model::grip::Hold;
 use crate::model::rod::RodModel;
 use crate::rod::assemble::{Hessian, assemble, assemble_blocks, assemble_clamps};
-use crate::rod::element_strain;
+use crate::rod::{brake, element_strain};
 use crate::row;
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;
@@ -64,6 +64,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     while out.iterations < settings.newton_max {
         out.iterations += 1;
         row::shape::review(model, state, scratch, out.iterations == 1);
+        brake::review(model, state, &mut scratch.brakes);
         row::couple::zones(scratch);
         let first = out.iterations == 1;
         let mut taken = 1.0;
@@ -117,6 +118,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         if scale >= 1.0
             && settled
             && row::couple::solved(scratch)
+            && brake::settled(model, state, &scratch.brakes)
             && row::shape::settled(model, state, scratch, out.iterations)
             && !row::thread::extend(model, state, scratch)
         {
@@ -153,7 +155,9 @@ fn strain_change(state: &State, step: &[DVec3], e: usize) -> DVec3 {
 
 /// Work along the last step of what `excess` says that the stretch and shear forces of each element are too large by.
 fn work_of_excess(state: &State, scratch: &Scratch, excess: impl Fn(usize, DVec3) -> DVec3) -> f64 {
-    let elements = scratch.rods.iter().flat_map(|(rod, _)| rod.start..rod.end - 1);
+    // What slips off a reel builds up no force.
+    let slips = |e: &usize| scratch.brakes.iter().any(|b| b.element == *e && b.slips);
+    let elements = scratch.rods.iter().flat_map(|(rod, _)| rod.start..rod.end - 1).filter(|e| !slips(e));
     let on = |e: usize| {
         let change = strain_change(state, &scratch.step, e);
         excess(e, change).dot(change)
@@ -180,6 +184,7 @@ fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 /// Assembles and factors. False when a pivot is not positive.
 pub(crate) fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
+    brake::assemble(model, state, scratch);
     row::shape::assemble(model, state, scratch, h, first);
     let Scratch { rows, rhs, system, .. } = &mut *scratch;
     rows.welds.assemble_joints(state, rhs, &mut system.diagonal, h);
@@ -309,6 +314,9 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
         for e in rod.start..rod.end - 1 {
             state.orientation[e] = (exp(scratch.step[2 * e + 1] * scale) * state.orientation[e]).normalize();
         }
+    }
+    for b in scratch.brakes.iter().filter(|b| b.slips) {
+        scratch.tension[b.element] = scratch.tension[b.element].min(b.limit);
     }
     let rows = &scratch.rows;
     rows.welds.apply(state, rows.sliders.count(), &rows.border, scale);

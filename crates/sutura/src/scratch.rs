@@ -72,6 +72,7 @@ pub(crate) struct Scratch {
     pub freedom: Vec<Freedom>,
     pub joint_on: Vec<bool>,
     pub clamps: Vec<ClampJoint>,
+    pub brakes: Vec<crate::rod::brake::Brake>,
 
     pub system: System,
     pub torque_correction: TorqueCorrection,

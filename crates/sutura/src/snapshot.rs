@@ -4,7 +4,8 @@ use crate::error::Error;
 use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
-use crate::state::{GripState, LoadState, ShapeContact, State, ThreadContact};
+use crate::model::reel::ReelLaw;
+use crate::state::{GripState, LoadState, ReelState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version.
@@ -44,7 +45,7 @@ macro_rules! number {
         }
     )*};
 }
-number!(u8, u32, u64, f64);
+number!(u8, u32, i32, u64, f64);
 
 /// Structures: their fields in order.
 macro_rules! structure {
@@ -164,6 +165,7 @@ macro_rules! variants {
     };
 }
 
+variants!(ReelLaw { 0 => Rate(rate), 1 => Brake(force) });
 variants!(Hold { 0 => Pin, 1 => Clamp, 2 => Jaw });
 variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit } });
 variants!(Place { 0 => Start, 1 => End, 2 => Particle(i), 3 => Element(e), 4 => Arc(s) });
@@ -174,6 +176,7 @@ variants!(LoadKind {
 });
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
+structure!(ReelState { rod, at_end, law, supply, nominal, length, fed, added });
 structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
 structure!(ShapeContact { shape, element, s, normal, normal_force, friction, drift, sliding });
 structure!(GripState { rod, index, hold, drive, ramp, taken_at, taken_pose, taken_velocity, taken_spin, pose, target, rest_half, half_span, force, torque });
@@ -181,6 +184,7 @@ structure!(State {
     time,
     last_h,
     calm,
+    rest_length,
     position,
     velocity,
     orientation,
@@ -193,6 +197,7 @@ structure!(State {
     shape_target,
     grips,
     loads,
+    reels,
     thread_contacts,
     shape_contacts,
 });

@@ -6,6 +6,7 @@ use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind};
 use crate::model::shape::ShapeMotion;
 use crate::newton;
+use crate::reel;
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::{ClampJoint, Freedom, Scratch};
@@ -22,14 +23,20 @@ pub(crate) struct Interval<'a> {
 }
 
 /// Advances the whole world by the interval, in equal substeps no longer than the setting.
-pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, report: &mut StepReport) {
+pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, report: &mut StepReport) {
     scratch.fit(model);
     outside_forces(model, state, scratch);
     let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
     let h = interval.length / n;
     report.converged = true;
     state.time = interval.start;
-    let whole = (0..n as u32).all(|k| advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report));
+    let whole = (0..n as u32).all(|k| {
+        if reel::renumber(model, state, h) {
+            scratch.fit(model);
+            outside_forces(model, state, scratch);
+        }
+        advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
+    });
     // Where nothing acceptable was found, what is driven stays with the rest.
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
@@ -43,7 +50,16 @@ const CALM: u32 = 6;
 
 /// Advances from `t` by `h`, or in two halves when the result is not acceptable. False when it got stuck.
 #[allow(clippy::too_many_arguments, reason = "the recursion on halves hands all of them on")]
-fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, t: f64, h: f64, depth: u32, report: &mut StepReport) -> bool {
+fn advance(
+    model: &mut Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &mut Interval<'_>,
+    t: f64,
+    h: f64,
+    depth: u32,
+    report: &mut StepReport,
+) -> bool {
     // Where substeps had to be short a while ago they start short.
     if depth < model.settings.halvings && state.last_h > 0.0 && h > state.last_h * if state.calm < CALM { 1.5 } else { 3.0 } {
         let half = 0.5 * h;
@@ -51,6 +67,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     save(state, scratch, depth);
+    reel::turn(model, state, h);
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
     row::thread::begin(model, state, scratch);
@@ -67,6 +84,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     match verdict {
         Ok(clearance) => {
             let last = state.last_h;
+            reel::pay_out(model, state, &scratch.brakes);
             accept(model, state, scratch, h);
             state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
@@ -84,6 +102,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
         }
         Err(reason) => {
             restore(state, scratch, depth);
+            reel::follow(model, state);
             report.rejected += 1;
             (state.last_h, state.calm) = (0.5 * h, 0);
             if depth < model.settings.halvings {
@@ -177,6 +196,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
     scratch.joint_on.fill(true);
     scratch.clamps.clear();
     scratch.rows.welds.begin(model, state, &mut scratch.joint_on);
+    crate::rod::brake::begin(model, state, &mut scratch.brakes);
     for (rod, _) in &scratch.rods {
         for i in rod.clone() {
             state.position[i] += state.velocity[i] * h;

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
+use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
@@ -12,7 +13,7 @@ use crate::params::{Friction, Settings};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::Scratch;
-use crate::state::{GripState, LoadState, State};
+use crate::state::{GripState, LoadState, ReelState, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
 
@@ -33,14 +34,11 @@ pub struct Wrench {
     pub torque: DVec3,
 }
 
-/// Penalty of the multiplier of an inextensible element over its physical stiffness: high enough that one Newton iteration leaves a
-/// hundredth of the physical stretch, low enough to cost no digits.
-const INEXTENSIBLE_PENALTY: f64 = 100.0;
-
 const ROD: Error = Error::StaleHandle { what: "rod" };
 const SHAPE: Error = Error::StaleHandle { what: "shape" };
 const GRIP: Error = Error::StaleHandle { what: "grip" };
 const LOAD: Error = Error::StaleHandle { what: "load" };
+const REEL: Error = Error::StaleHandle { what: "reel" };
 const WELD: Error = Error::StaleHandle { what: "weld" };
 
 /// Substeps that one call may take.
@@ -92,23 +90,27 @@ impl World {
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
         for e in 0..=n {
-            let (before, after) = (if e > 0 { low.rest_lengths[e - 1] } else { 0.0 }, if e < n { low.rest_lengths[e] } else { 0.0 });
+            // The last entry is no element; its stiffness is never used.
+            let section = low.sections[e.min(n - 1)];
+            let after = if e < n { low.rest_lengths[e] } else { 0.0 };
             model.rod_of.push(handle.index);
             model.mass.push(0.0);
             model.inertia.push(DVec3::ZERO);
             model.rest_length.push(after);
+            state.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
-            let (l, section) = if e < n { (after, low.sections[e]) } else { (before, low.sections[n - 1]) };
             model.section.push(section);
-            let penalty = if spec.stretch == Stretch::Inextensible { INEXTENSIBLE_PENALTY } else { 1.0 };
-            model.stretch_stiffness.push(DVec3::new(section.kga, section.kga, penalty * section.ea) / l);
-            let joint = if e > 0 && e < n { 0.5 * (before + after) } else { 0.0 };
-            model.joint_length.push(joint);
-            model.bend_stiffness.push(if joint > 0.0 { joined(low.sections[e - 1].bend, before, section.bend, after) } else { section.bend / l });
+            model.stretch_stiffness.push(DVec3::splat(section.ea));
+            model.joint_length.push(0.0);
+            model.bend_stiffness.push(section.bend);
             model.bend_damping.push(spec.material.bend_damping);
             model.rest_half.push(if e < n { low.rest_half[e] } else { DQuat::IDENTITY });
             state.position.push(low.centerline[e]);
             state.orientation.push(if e < n { low.frames[e] } else { DQuat::IDENTITY });
+        }
+        for e in first..=first + n {
+            model.refresh_element(e);
+            model.refresh_joint(e);
         }
         let total = first + n + 1;
         state.velocity.resize(total, DVec3::ZERO);
@@ -121,8 +123,8 @@ impl World {
                 state.tension[e] = crate::rod::element_strain(&self.model, state, e).z * self.model.stretch_stiffness[e].z;
             }
         }
-        self.refresh_masses();
-        self.refresh_welds();
+        self.model.refresh_masses(&self.state.loads);
+        self.model.refresh_welds();
         if let Some([before, after]) = low.seam {
             let member = |particle, before, after| Member { rod: handle.index, particle, before, after };
             let orientation = row::weld::between(low.frames[n - 1], low.frames[0], before * after);
@@ -151,6 +153,7 @@ impl World {
             model.bend_stiffness,
             model.bend_damping,
             model.rest_half,
+            state.rest_length,
             state.position,
             state.velocity,
             state.orientation,
@@ -180,7 +183,8 @@ impl World {
             weld.members.retain(|m| m.rod != rod.index);
         }
         model.welds.retain(|w| w.members.len() >= 2);
-        self.refresh_welds();
+        model.refresh_welds();
+        state.reels.retain(|r| r.rod != rod.index);
         Ok(())
     }
 
@@ -205,7 +209,7 @@ impl World {
         if apart > 0.1 * least {
             return Err(Error::invalid("weld", "places", apart, "places within a tenth of a radius of each other [m]"));
         }
-        let held: Vec<usize> = places.iter().map(|p| p.2).filter(|i| self.is_held(*i)).collect();
+        let held: Vec<usize> = places.iter().map(|p| p.2).filter(|i| crate::reel::held(model, state, *i)).collect();
         if held.len() > 1 {
             return Err(Error::invalid("weld", "places", format!("{} held", held.len()), "at most one place that a grip holds"));
         }
@@ -258,7 +262,7 @@ impl World {
     /// Takes a weld apart. A thread that went through it goes on, ends are free.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
         self.model.welds.remove(weld).ok_or(WELD)?;
-        self.refresh_welds();
+        self.model.refresh_welds();
         Ok(())
     }
 
@@ -276,28 +280,8 @@ impl World {
         let handle: Handle<Weld> = self.model.welds.insert(weld);
         self.state.weld_orientation.resize(self.model.welds.len(), DQuat::IDENTITY);
         self.state.weld_orientation[handle.index()] = orientation;
-        self.refresh_welds();
+        self.model.refresh_welds();
         handle
-    }
-
-    fn refresh_welds(&mut self) {
-        let model = &mut self.model;
-        model.weld_of.clear();
-        model.weld_of.resize(model.mass.len(), None);
-        for (slot, weld) in model.welds.iter() {
-            for member in &weld.members {
-                let first = model.rods.at(member.rod).expect("welds go with their rods").first;
-                model.weld_of[(first + member.particle) as usize] = Some(slot);
-            }
-        }
-    }
-
-    /// Whether a grip holds a particle.
-    fn is_held(&self, i: usize) -> bool {
-        self.state.grips.iter().any(|(_, g)| {
-            let first = (self.model.rods.at(g.rod).expect("grips go with their rod").first + g.index) as usize;
-            (first..=first + usize::from(g.hold == Hold::Jaw)).contains(&i)
-        })
     }
 
     /// Adds a shape.
@@ -361,11 +345,14 @@ impl World {
         let first = (rod.first + index) as usize;
         let wanted = first..=first + usize::from(spec.hold == Hold::Jaw);
         let welded = wanted.clone().filter_map(|i| self.model.weld_of[i]).flat_map(|w| self.model.welds.at(w).into_iter().flat_map(|w| &w.members));
-        if wanted.clone().chain(welded.map(|m| m.index(&self.model))).any(|i| self.is_held(i)) {
+        if wanted.clone().chain(welded.map(|m| m.index(&self.model))).any(|i| crate::reel::held(&self.model, &self.state, i)) {
             return Err(Error::invalid("grip", "place", spec.place, "a piece that no other grip holds"));
         }
         let i = (rod.first + index) as usize;
         let state = &self.state;
+        if spec.hold == Hold::Jaw && state.reels.iter().any(|(_, r)| r.rod == spec.rod.index && r.element(&self.model) == i) {
+            return Err(Error::invalid("grip", "place", spec.place, "an element that is not at a reel, for a jaw"));
+        }
         let (mut rest_half, mut half_span) = (DQuat::IDENTITY, DVec3::ZERO);
         let (position, orientation, velocity, spin) = match spec.hold {
             Hold::Pin => (state.position[i], DQuat::IDENTITY, state.velocity[i], DVec3::ZERO),
@@ -459,7 +446,7 @@ impl World {
         let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
         self.validate_load(&spec.kind, rod)?;
         let handle = self.state.loads.insert(LoadState { rod: spec.rod.index, kind: spec.kind });
-        self.refresh_masses();
+        self.model.refresh_masses(&self.state.loads);
         Ok(handle)
     }
 
@@ -470,14 +457,62 @@ impl World {
         if let Some(l) = self.state.loads.get_mut(load) {
             l.kind = kind;
         }
-        self.refresh_masses();
+        self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
 
     /// Removes a load.
     pub fn remove_load(&mut self, load: Handle<Load>) -> Result<(), Error> {
         self.state.loads.remove(load).ok_or(LOAD)?;
-        self.refresh_masses();
+        self.model.refresh_masses(&self.state.loads);
+        Ok(())
+    }
+
+    /// Sets a reel up.
+    pub fn insert_reel(&mut self, spec: &ReelSpec) -> Result<Handle<Reel>, Error> {
+        spec.validate()?;
+        let (model, state) = (&self.model, &self.state);
+        let rod = model.rods.get(spec.rod).ok_or(ROD)?;
+        self.validate_law(&spec.law, rod)?;
+        if state.reels.iter().any(|(_, r)| r.rod == spec.rod.index && r.at_end == spec.at_end) {
+            return Err(Error::invalid("reel", "at_end", spec.at_end, "an end that has no reel yet"));
+        }
+        let e = if spec.at_end { rod.elements().end - 1 } else { rod.first as usize };
+        if model.weld_of[if spec.at_end { e + 1 } else { e }].is_some() {
+            return Err(Error::invalid("reel", "at_end", spec.at_end, "an end that is not welded"));
+        }
+        let alike = rod.elements().all(|k| model.section[k] == model.section[e] && model.rest_half[k] == DQuat::IDENTITY);
+        if rod.n_elements < 2 || !alike {
+            return Err(Error::invalid("reel", "rod", spec.rod, "a thread of two elements or more, of one section, straight at rest"));
+        }
+        let jaw = |g: &GripState| g.rod == spec.rod.index && g.hold == Hold::Jaw && (rod.first + g.index) as usize == e;
+        if state.grips.iter().any(|(_, g)| jaw(g)) {
+            return Err(Error::invalid("reel", "at_end", spec.at_end, "an end whose last element no jaw holds"));
+        }
+        let length = model.rest_length[e];
+        let reel = ReelState { rod: spec.rod.index, at_end: spec.at_end, law: spec.law, supply: spec.supply, nominal: length, length, fed: 0.0, added: 0 };
+        Ok(self.state.reels.insert(reel))
+    }
+
+    /// Changes what a reel does, from the next step on.
+    pub fn set_reel(&mut self, reel: Handle<Reel>, law: ReelLaw) -> Result<(), Error> {
+        law.validate()?;
+        let rod = self.state.reels.get(reel).ok_or(REEL)?.rod;
+        self.validate_law(&law, self.model.rods.at(rod).ok_or(ROD)?)?;
+        self.state.reels.get_mut(reel).ok_or(REEL)?.law = law;
+        Ok(())
+    }
+
+    /// Length that a reel has fed in, less what it has drawn back \[m\].
+    pub fn reel_fed(&self, reel: Handle<Reel>) -> Result<f64, Error> {
+        self.state.reels.get(reel).map(|r| r.fed).ok_or(REEL)
+    }
+
+    fn validate_law(&self, law: &ReelLaw, rod: &RodModel) -> Result<(), Error> {
+        law.validate()?;
+        if matches!(law, ReelLaw::Brake(_)) && rod.stretch == Stretch::Inextensible {
+            return Err(Error::invalid("reel", "law", law, "a rate, for a thread that does not stretch"));
+        }
         Ok(())
     }
 
@@ -486,32 +521,6 @@ impl World {
         match kind {
             LoadKind::Point { place, .. } | LoadKind::Mass { place, .. } => place.validate("load", &self.model, rod),
             LoadKind::Uniform { .. } => Ok(()),
-        }
-    }
-
-    /// Lumped masses and spin inertias: half of each element at its ends, and what is attached.
-    fn refresh_masses(&mut self) {
-        let model = &mut self.model;
-        model.mass.fill(0.0);
-        model.inertia.fill(DVec3::ZERO);
-        for (_, rod) in model.rods.iter() {
-            for e in rod.elements() {
-                let l = model.rest_length[e];
-                let section = model.section[e];
-                let half = 0.5 * section.mass * l;
-                model.mass[e] += half;
-                model.mass[e + 1] += half;
-                model.inertia[e] = section.inertia * l;
-            }
-        }
-        for (_, load) in self.state.loads.iter() {
-            if let LoadKind::Mass { place, mass, inertia } = load.kind {
-                let rod = self.model.rods.at(load.rod).expect("loads go with their rod");
-                let (e, s) = place.on_element(&self.model, rod);
-                self.model.mass[e] += mass * (1.0 - s);
-                self.model.mass[e + 1] += mass * s;
-                self.model.inertia[e] += inertia;
-            }
         }
     }
 
@@ -603,7 +612,7 @@ impl World {
         }
         self.report_teleports(dt, &mut report);
         let mut interval = crate::step::Interval { start, length: dt, observe };
-        crate::step::step(&self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
+        crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
         report.time = self.state.time;
         report.contacts = self.contacts().count() as u32;
         report.length_error = self.length_error();
@@ -641,17 +650,32 @@ impl World {
     /// Takes the world back to a snapshot of a world with the same model. On error nothing is changed.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let state = crate::snapshot::read(bytes)?;
-        self.check_fit(&state).map_err(|reason| Error::Snapshot { reason: reason.into() })?;
+        let error = |reason: &str| Error::Snapshot { reason: reason.into() };
+        crate::reel::check(&self.model, &self.state, &state).map_err(error)?;
+        crate::reel::refit(&mut self.model, &self.state, &state);
+        if let Err(reason) = self.check_fit(&state) {
+            crate::reel::refit(&mut self.model, &state, &self.state);
+            return Err(error(reason));
+        }
         // Into the memory that is there, so that the next steps need not grow it again.
         self.state.copy_from(&state);
-        self.refresh_masses();
+        self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
 
     /// Whether a state read from outside belongs to this model and is usable.
     fn check_fit(&self, s: &State) -> Result<(), &'static str> {
         let n = self.model.mass.len();
-        let lengths = [s.position.len(), s.velocity.len(), s.orientation.len(), s.angular_velocity.len(), s.tension.len(), s.plastic.len(), s.hardened.len()];
+        let lengths = [
+            s.rest_length.len(),
+            s.position.len(),
+            s.velocity.len(),
+            s.orientation.len(),
+            s.angular_velocity.len(),
+            s.tension.len(),
+            s.plastic.len(),
+            s.hardened.len(),
+        ];
         if lengths.iter().any(|l| *l != n) {
             return Err("it is of a world with other threads");
         }
@@ -723,9 +747,4 @@ impl World {
     pub fn forget_scratch(&mut self) {
         self.scratch = Scratch::default();
     }
-}
-
-/// Stiffness of a joint: half an element of bending stiffness `a` and length `la` in series with half of the next.
-fn joined(a: DVec3, la: f64, b: DVec3, lb: f64) -> DVec3 {
-    if a == b { a / (0.5 * (la + lb)) } else { (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip() }
 }

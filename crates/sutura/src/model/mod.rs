@@ -2,6 +2,7 @@
 
 pub mod grip;
 pub mod material;
+pub mod reel;
 pub mod rod;
 pub mod section;
 pub mod shape;
@@ -9,11 +10,17 @@ pub mod weld;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
+use crate::state::LoadState;
 use glam::{DQuat, DVec3};
+use grip::LoadKind;
 use material::SectionStiffness;
 use rod::RodModel;
 use shape::{Geometry, ShapeMotion};
 use weld::WeldModel;
+
+/// Penalty of the multiplier of an inextensible element over its physical stiffness: high enough that one Newton iteration leaves a
+/// hundredth of the physical stretch, low enough to cost no digits.
+const INEXTENSIBLE_PENALTY: f64 = 100.0;
 
 /// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last element entry
 /// of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
@@ -68,6 +75,61 @@ impl Model {
         match self.friction.binary_search_by_key(&key, |(k, _)| *k) {
             Ok(i) => self.friction[i].1,
             Err(_) => self.settings.friction,
+        }
+    }
+    /// Stiffness of an element from its section and length.
+    pub(crate) fn refresh_element(&mut self, e: usize) {
+        if self.is_element(e) {
+            let penalty = if self.inextensible[e] { INEXTENSIBLE_PENALTY } else { 1.0 };
+            let section = &self.section[e];
+            self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, penalty * section.ea) / self.rest_length[e];
+        }
+    }
+    /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of the next.
+    pub(crate) fn refresh_joint(&mut self, e: usize) {
+        let joint = e > 0 && self.is_element(e) && self.is_element(e - 1) && self.rod_of[e] == self.rod_of[e - 1];
+        if !joint {
+            self.joint_length[e] = 0.0;
+            return;
+        }
+        let (la, lb) = (self.rest_length[e - 1], self.rest_length[e]);
+        let (a, b) = (self.section[e - 1].bend, self.section[e].bend);
+        self.joint_length[e] = 0.5 * (la + lb);
+        self.bend_stiffness[e] = if a == b { a / self.joint_length[e] } else { (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip() };
+    }
+    /// Lumped masses and spin inertias: half of each element at its ends, and what is attached.
+    pub(crate) fn refresh_masses(&mut self, loads: &Slots<LoadState>) {
+        self.mass.fill(0.0);
+        self.inertia.fill(DVec3::ZERO);
+        for (_, rod) in self.rods.iter() {
+            for e in rod.elements() {
+                let l = self.rest_length[e];
+                let section = self.section[e];
+                let half = 0.5 * section.mass * l;
+                self.mass[e] += half;
+                self.mass[e + 1] += half;
+                self.inertia[e] = section.inertia * l;
+            }
+        }
+        for (_, load) in loads.iter() {
+            if let LoadKind::Mass { place, mass, inertia } = load.kind {
+                let rod = self.rods.at(load.rod).expect("loads go with their rod");
+                let (e, s) = place.on_element(self, rod);
+                self.mass[e] += mass * (1.0 - s);
+                self.mass[e + 1] += mass * s;
+                self.inertia[e] += inertia;
+            }
+        }
+    }
+    /// Which weld each particle belongs to.
+    pub(crate) fn refresh_welds(&mut self) {
+        self.weld_of.clear();
+        self.weld_of.resize(self.mass.len(), None);
+        for (slot, weld) in self.welds.iter() {
+            for member in &weld.members {
+                let first = self.rods.at(member.rod).expect("welds go with their rods").first;
+                self.weld_of[(first + member.particle) as usize] = Some(slot);
+            }
         }
     }
     /// Whether `e` is an element (and not the unused last entry of a rod).

@@ -1,6 +1,7 @@
 //! The discrete Cosserat rod: strains, their linear system, and read-outs.
 
 pub(crate) mod assemble;
+pub(crate) mod brake;
 pub(crate) mod factor;
 pub(crate) mod lanes;
 pub(crate) mod strain;

@@ -3,6 +3,7 @@
 use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Hold, LoadKind};
+use crate::model::reel::ReelLaw;
 use glam::{DQuat, DVec3};
 
 /// One vector a quantity.
@@ -15,6 +16,8 @@ pub struct State {
     /// Accepted substeps since their length last changed.
     pub(crate) calm: u32,
 
+    /// Rest length of each element \[m\]; the model has the same.
+    pub(crate) rest_length: Vec<f64>,
     pub(crate) position: Vec<DVec3>,
     pub(crate) velocity: Vec<DVec3>,
     pub(crate) orientation: Vec<DQuat>,
@@ -34,6 +37,7 @@ pub struct State {
 
     pub(crate) grips: Slots<GripState>,
     pub(crate) loads: Slots<LoadState>,
+    pub(crate) reels: Slots<ReelState>,
 
     /// Contacts of the last accepted substep, sorted by key.
     pub(crate) thread_contacts: Vec<ThreadContact>,
@@ -65,6 +69,22 @@ pub(crate) struct GripState {
     /// Force and torque on the thread at the last accepted substep \[N\], \[N m\].
     pub force: DVec3,
     pub torque: DVec3,
+}
+
+/// A reel in action.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ReelState {
+    pub rod: u32,
+    pub at_end: bool,
+    pub law: ReelLaw,
+    /// Length that is left on it \[m\].
+    pub supply: Option<f64>,
+    /// Length of the element there when the reel was set up, and rest length of the element there now \[m\].
+    pub nominal: f64,
+    pub length: f64,
+    /// Length fed in less length drawn back since then \[m\], and elements added less those taken away.
+    pub fed: f64,
+    pub added: i32,
 }
 
 /// A load in action.
@@ -115,6 +135,7 @@ impl State {
             time,
             last_h,
             calm,
+            rest_length,
             position,
             velocity,
             orientation,
@@ -127,12 +148,14 @@ impl State {
             shape_target,
             grips,
             loads,
+            reels,
             thread_contacts,
             shape_contacts,
         } = from;
         self.time = *time;
         self.last_h = *last_h;
         self.calm = *calm;
+        self.rest_length.clone_from(rest_length);
         self.position.clone_from(position);
         self.velocity.clone_from(velocity);
         self.orientation.clone_from(orientation);
@@ -145,6 +168,7 @@ impl State {
         self.shape_target.clone_from(shape_target);
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
+        self.reels.copy_from(reels);
         self.thread_contacts.clone_from(thread_contacts);
         self.shape_contacts.clone_from(shape_contacts);
     }

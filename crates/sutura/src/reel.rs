@@ -21,14 +21,15 @@ impl ReelState {
     }
 }
 
-/// Feeds the length of a substep at its start.
-pub(crate) fn turn(model: &mut Model, state: &mut State, h: f64) {
+/// Feeds the length of a substep at its start. True where there are reels: weights are others then.
+pub(crate) fn turn(model: &mut Model, state: &mut State, h: f64) -> bool {
     for (_, reel) in state.reels.iter_mut() {
         if let ReelLaw::Rate(rate) = reel.law {
             reel.feed(rate * h);
         }
     }
     follow(model, state);
+    state.reels.iter().next().is_some()
 }
 
 /// Gives off what brakes let slip in a substep.

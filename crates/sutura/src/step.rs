@@ -33,7 +33,6 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
             scratch.fit(model);
-            outside_forces(model, state, scratch);
         }
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
@@ -67,7 +66,9 @@ fn advance(
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     save(state, scratch, depth);
-    reel::turn(model, state, h);
+    if reel::turn(model, state, h) {
+        outside_forces(model, state, scratch);
+    }
     predict(model, state, scratch, interval, t + h, h);
     collide::detect(model, state, scratch);
     row::thread::begin(model, state, scratch);

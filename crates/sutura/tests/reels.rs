@@ -27,9 +27,17 @@ fn a_hanging_thread_is_let_down_and_drawn_up_at_the_rate_of_its_reel() {
         let mut length = 0.05;
         for (rate, time) in [(0.03, 1.0), (-0.05, 1.0), (0.0, 0.5), (0.04, 1.0), (-0.02, 2.0)] {
             world.set_reel(reel, ReelLaw::Rate(rate)).unwrap();
-            for _ in 0..(60.0 * time) as u32 {
+            // Mean excess of the force over the weight in the second half of the time.
+            let mut excess = 0.0;
+            let frames = (60.0 * time) as u32;
+            for k in 0..frames {
                 let report = world.step(1.0 / 60.0);
                 assert!(report.incidents.is_empty() && report.length_error < 1e-4, "{report:?}");
+                let view = world.rod(rod).unwrap();
+                let weight = view.mass_per_length(0) * view.rest_length() * 9.81;
+                if k >= frames / 2 {
+                    excess += (world.grip_wrench(grip).unwrap().force.z - weight) / f64::from(frames - frames / 2);
+                }
             }
             length += rate * time;
             let view = world.rod(rod).unwrap();
@@ -42,10 +50,9 @@ fn a_hanging_thread_is_let_down_and_drawn_up_at_the_rate_of_its_reel() {
             // It hangs straight down, and the reel carries its weight, which grows with it.
             assert!((lowest(&world) + length).abs() < 1e-4 * length, "{at_end} {rate}: {} {length}", lowest(&world));
             let weight = view.mass_per_length(0) * length * 9.81;
-            let force = world.grip_wrench(grip).unwrap().force;
-            // And the momentum that comes in or goes out with the thread: of the order mu v^2, wherever between mouth and first particle it does.
+            // The momentum that comes in or goes out with the thread makes a difference of the order mu v^2.
             let flux = 2.0 * view.mass_per_length(0) * rate * rate;
-            assert!((force.z - weight).abs() < 0.005 * weight + flux, "{at_end} {rate}: {force} {weight}");
+            assert!(excess.abs() < 2e-3 * weight + flux, "{at_end} {rate}: {excess} {weight}");
             // Elements stay of the length that they had.
             let (least, most) = view.rest_lengths().iter().fold((1.0, 0.0), |(a, b): (f64, f64), l| (a.min(*l), b.max(*l)));
             let substep = rate.abs() / 240.0;

@@ -49,12 +49,14 @@ impl Judge {
 }
 
 /// Recognizes the knot of a thread. `held`: the arc lengths at which it is held; when both halves are, the piece between the outermost
-/// two is closed along rays away from its middle, otherwise the ends count as free.
+/// two is closed along rays away from its middle, otherwise the ends count as free. A closed thread needs neither.
 pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
     let points = rod.positions();
     let length = rod.rest_length();
     let (first, last) = (held.iter().copied().fold(f64::INFINITY, f64::min), held.iter().copied().fold(f64::NEG_INFINITY, f64::max));
-    let recognition = if first < 0.5 * length && last > 0.5 * length {
+    let recognition = if rod.is_closed() {
+        knot::recognize(points, Ends::Closed, seed)
+    } else if first < 0.5 * length && last > 0.5 * length {
         let arc = |i: usize| rod.arc(i);
         // A little tolerance, since arc lengths are sums.
         let inside: Vec<DVec3> = (0..points.len()).filter(|i| arc(*i) >= first - 1e-9 * length && arc(*i) <= last + 1e-9 * length).map(|i| points[i]).collect();
@@ -78,9 +80,12 @@ pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
 const TAILS: f64 = 1e4;
 
 /// Writhe of a thread in turns, its ends extended far along the tangents there: twist + writhe of a thread held by two clamps then
-/// changes by their turning alone, and jumps by 2 where the thread passes through itself.
+/// changes by their turning alone, and jumps by 2 where the thread passes through itself. A closed thread as it is.
 pub fn writhe(rod: &RodView<'_>) -> f64 {
     let points = rod.positions();
+    if rod.is_closed() {
+        return knot::writhe(points, true);
+    }
     let tail = |from: DVec3, to: DVec3| to + (to - from).normalize_or_zero() * (TAILS * rod.rest_length());
     let n = points.len();
     let mut extended = vec![tail(points[1], points[0])];

@@ -12,16 +12,16 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, Moment, Mover, Phase, ProbeDef, ProfileDef, Scene, ShapeDef, Span, Step, Take, ThreadDef, Wanted,
-    engine_place,
+    Action, Camera, CheckDef, End, Late, LoadDef, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Take, ThreadDef, Wanted,
+    WeldDef, engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};
 use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3, EulerRot};
 use sutura::math::{exp, frame_from_tangent, log};
 use sutura::{
-    Along, Friction, Geometry, Hold, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Stretch,
-    transported_frames,
+    Along, Closure, Friction, Geometry, Hold, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion,
+    ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
 };
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
@@ -45,6 +45,7 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
         surfaces: Vec::new(),
         threads: Vec::new(),
         shapes: Vec::new(),
+        reels: Vec::new(),
         grips: Vec::new(),
         loads: Vec::new(),
         phases: Vec::new(),
@@ -55,6 +56,16 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
     scene.ok_or_else(|| SceneError::of_file(file_name, "could not be read"))
 }
 
+/// Every table of a name, read and finished.
+fn read_all<'d, T>(root: &Table<'d>, key: &str, read: impl Fn(&Table<'d>) -> Option<T>) -> Vec<T> {
+    let one = |t: &Table<'d>| {
+        let found = read(t);
+        t.finish();
+        found
+    };
+    root.tables(key).iter().filter_map(one).collect()
+}
+
 /// What is known while reading.
 struct Loader<'d> {
     doc: &'d Doc,
@@ -63,6 +74,7 @@ struct Loader<'d> {
     surfaces: Vec<String>,
     threads: Vec<ThreadDef>,
     shapes: Vec<ShapeDef>,
+    reels: Vec<ReelDef>,
     grips: Vec<String>,
     loads: Vec<String>,
     phases: Vec<String>,
@@ -101,6 +113,8 @@ impl<'d> Loader<'d> {
         }
         self.collect_names(root, start.as_ref());
         let frictions = self.friction(root);
+        let welds = read_all(root, "weld", |t| self.weld(t));
+        self.reels = read_all(root, "reel", |t| self.reel(t));
 
         let mut initial = Vec::new();
         for table in root.tables("grip") {
@@ -143,6 +157,8 @@ impl<'d> Loader<'d> {
             solver_location,
             threads: std::mem::take(&mut self.threads),
             shapes: std::mem::take(&mut self.shapes),
+            welds,
+            reels: std::mem::take(&mut self.reels),
             grips: std::mem::take(&mut self.grips),
             loads: std::mem::take(&mut self.loads),
             start,

@@ -10,7 +10,7 @@ use cpu_time::ThreadTime;
 use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Geometry, IncidentKind, World};
+use sutura::{Geometry, IncidentKind, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -374,12 +374,12 @@ impl Runner {
                 ShapeOutline::Mesh { vertices: vertices.iter().map(DVec3::to_array).collect(), triangles: triangles.clone() }
             }
         };
-        let thread = |t: &crate::scene::ThreadDef| Thread { name: t.name.clone(), radius: t.spec.radius, elements: t.spec.centerline.len() - 1 };
+        let thread = |(t, r): (&crate::scene::ThreadDef, RodView<'_>)| Thread { name: t.name.clone(), radius: t.spec.radius, elements: r.n_elements() };
         Header {
             scene: self.scene.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             frame_rate: self.scene.frame_rate,
-            threads: self.scene.threads.iter().map(thread).collect(),
+            threads: self.scene.threads.iter().zip(self.stage.rods()).map(thread).collect(),
             shapes: self.scene.shapes.iter().map(|s| Shape { name: s.name.clone(), outline: outline(&s.spec.geometry) }).collect(),
             grips: self.scene.grips.clone(),
         }
@@ -402,7 +402,8 @@ impl Runner {
         }
     }
     fn record(&mut self) {
-        let frame = self.frame();
+        let mut frame = self.frame();
+        frame.fit(&self.trajectory.header);
         self.trajectory.frames.push(frame);
     }
 
@@ -468,11 +469,12 @@ impl Runner {
     fn thread_reports(&self) -> Vec<ThreadReport> {
         let one = |(i, def): (usize, &crate::scene::ThreadDef)| {
             let handle = self.stage.threads[i];
+            let rod = self.stage.world.rod(handle).ok();
             let audited = self.stage.judge.max_elongation(handle.index());
             ThreadReport {
                 name: def.name.clone(),
-                elements: def.spec.centerline.len() - 1,
-                length_m: self.stage.world.rod(handle).map_or(0.0, |r| r.rest_length()),
+                elements: rod.map_or(0, |r| r.n_elements()),
+                length_m: rod.map_or(0.0, |r| r.rest_length()),
                 radius_m: def.spec.radius,
                 max_elongation: audited.unwrap_or(0.0).max(self.max_elongation[i]),
                 max_tension_n: if self.max_tension[i].is_finite() { self.max_tension[i] } else { 0.0 },

@@ -7,7 +7,7 @@ use crate::motion::Plan;
 use crate::units::Unit;
 use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
-use sutura::{Friction, Hold, Place, RodSpec, Settings, ShapeSpec};
+use sutura::{Friction, Hold, Place, ReelLaw, RodSpec, Settings, ShapeSpec, WeldRest};
 
 /// A scene, read from a file and checked.
 #[derive(Debug, Clone)]
@@ -27,6 +27,8 @@ pub struct Scene {
     pub(crate) solver_location: Location,
     pub(crate) threads: Vec<ThreadDef>,
     pub(crate) shapes: Vec<ShapeDef>,
+    pub(crate) welds: Vec<WeldDef>,
+    pub(crate) reels: Vec<ReelDef>,
     pub(crate) grips: Vec<String>,
     pub(crate) loads: Vec<String>,
     pub(crate) start: Option<(PathBuf, Location)>,
@@ -63,6 +65,22 @@ pub(crate) struct ThreadDef {
 pub(crate) struct ShapeDef {
     pub name: String,
     pub spec: ShapeSpec,
+    pub location: Location,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct WeldDef {
+    pub places: Vec<(usize, Place)>,
+    pub rest: WeldRest,
+    pub location: Location,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct ReelDef {
+    pub thread: usize,
+    pub at_end: bool,
+    pub law: ReelLaw,
+    pub supply: Option<f64>,
     pub location: Location,
 }
 
@@ -121,6 +139,10 @@ pub(crate) enum Action {
         substep: Option<f64>,
         newton_max: Option<u32>,
         tolerance: Option<f64>,
+    },
+    Reel {
+        reel: usize,
+        law: ReelLaw,
     },
     Friction {
         a: u32,

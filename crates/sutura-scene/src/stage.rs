@@ -13,7 +13,10 @@ use std::cell::RefCell;
 use sutura::glam::{DQuat, DVec3};
 use sutura::knot::Entries;
 use sutura::math::log;
-use sutura::{Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Rod, RodView, Shape, ShapeMotion, StepReport, World};
+use sutura::{
+    Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
+    World,
+};
 
 /// A grip that holds.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +101,7 @@ pub struct Stage {
     pub world: World,
     pub threads: Vec<Handle<Rod>>,
     pub shapes: Vec<Handle<Shape>>,
+    reels: Vec<Handle<Reel>>,
     grips: Vec<Option<Held>>,
     loads: Vec<Option<Acting>>,
     moving: Vec<Moving>,
@@ -153,12 +157,22 @@ impl Stage {
         if !problems.is_empty() {
             return Err(SceneError { problems });
         }
+        for weld in &scene.welds {
+            let places = weld.places.iter().map(|(thread, place)| (threads[*thread], *place)).collect();
+            world.insert_weld(&WeldSpec { places, rest: weld.rest }).map_err(|e| at(&weld.location, e))?;
+        }
+        let mut reels = Vec::new();
+        for reel in &scene.reels {
+            let spec = ReelSpec { rod: threads[reel.thread], at_end: reel.at_end, law: reel.law, supply: reel.supply };
+            reels.push(world.insert_reel(&spec).map_err(|e| at(&reel.location, e))?);
+        }
         let names = Names { threads: scene.threads.iter().map(|t| t.name.clone()).collect(), grips: scene.grips.clone(), loads: scene.loads.clone() };
         let mut stage = Stage {
             marks: vec![None; threads.len()],
             world,
             threads,
             shapes,
+            reels,
             grips: vec![None; scene.grips.len()],
             loads: vec![None; scene.loads.len()],
             moving: Vec::new(),
@@ -300,6 +314,7 @@ impl Stage {
                 s.tolerance = tolerance.unwrap_or(s.tolerance);
                 self.world.set_settings(s)
             }
+            Action::Reel { reel, law } => self.world.set_reel(self.reels[*reel], *law),
             Action::Friction { a, b, friction } => self.world.set_friction(*a, *b, *friction),
         }
     }

@@ -220,6 +220,26 @@ impl Trajectory {
     }
 }
 
+impl Frame {
+    /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts of the thread's elements.
+    pub(crate) fn fit(&mut self, header: &Header) {
+        for (thread, (x, q)) in header.threads.iter().zip(self.positions.iter_mut().zip(&mut self.orientations)) {
+            let (n, had) = (thread.elements, q.len());
+            if n == had || n == 0 || had == 0 {
+                continue;
+            }
+            let at = |k: usize| {
+                let s = k as f64 * had as f64 / n as f64;
+                let e = (s as usize).min(had - 1);
+                let u = (s - e as f64) as f32;
+                std::array::from_fn(|c| x[e][c] + (x[e + 1][c] - x[e][c]) * u)
+            };
+            *x = (0..=n).map(at).collect();
+            *q = (0..n).map(|k| q[(((k as f64 + 0.5) * had as f64 / n as f64) as usize).min(had - 1)]).collect();
+        }
+    }
+}
+
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,

@@ -1,5 +1,6 @@
 //! What happens: phases, actions, motions, loads.
 
+use super::things::{n_elements, reel_law};
 use super::*;
 
 /// Longest time of a phase that ends by a condition, unless it says otherwise \[s\].
@@ -64,7 +65,7 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
-        const VERBS: [&str; 11] = ["take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction"];
+        const VERBS: [&str; 12] = ["take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction", "reel"];
         let found: Vec<(&str, Value<'d>)> = VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
         let [(verb, value)] = found.as_slice() else {
             table.finish();
@@ -82,6 +83,7 @@ impl<'d> Loader<'d> {
             "unload" => self.find_load(value).map(|load| Action::Unload { load }),
             "mark" => self.find_thread(value).map(|thread| Action::Mark { thread }),
             "gravity" => value.vector(Dim::ACCELERATION).map(|v| Action::Gravity { value: v, ramp: ramp(table, 0.0) }),
+            "reel" => self.find_reel(value).zip(reel_law(table)).map(|(reel, law)| Action::Reel { reel, law }),
             "friction" => self.two_surfaces(value).zip(coefficients(table)).map(|((a, b), friction)| Action::Friction { a, b, friction }),
             _ => value.table().map(|t| {
                 let has = |key: &str| t.has(key);
@@ -100,6 +102,20 @@ impl<'d> Loader<'d> {
         };
         table.finish();
         Some(Step { action: action?, location: table.location() })
+    }
+
+    /// The reel at the start or end of a thread, told as `\"thread.end\"`.
+    fn find_reel(&self, value: &Value<'d>) -> Option<usize> {
+        let text = value.text()?;
+        let found = text.rsplit_once('.').and_then(|(thread, end)| {
+            let at_end = [("start", false), ("end", true)].iter().find(|(name, _)| *name == end)?.1;
+            self.reels.iter().position(|r| self.threads[r.thread].name == thread && r.at_end == at_end)
+        });
+        if found.is_none() {
+            let all = self.reels.iter().map(|r| format!("{}.{}", self.threads[r.thread].name, if r.at_end { "end" } else { "start" }));
+            value.problem(format!("there is no reel at `{text}`"), Some(format!("reels: {}", all.collect::<Vec<_>>().join(", "))));
+        }
+        found
     }
 
     pub(super) fn take(&self, table: &Table<'d>, grip: usize, default_ramp: f64) -> Option<Action> {
@@ -123,7 +139,7 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn place(&self, value: &Value<'d>, thread: usize) -> Option<Place> {
-        let n = self.threads.get(thread)?.spec.centerline.len() - 1;
+        let n = n_elements(&self.threads.get(thread)?.spec);
         let length: f64 = self.rest_length(thread);
         let at = if value.is_text() {
             let text = value.text()?;
@@ -168,7 +184,11 @@ impl<'d> Loader<'d> {
         let spec = &self.threads[thread].spec;
         match &spec.rest {
             RestShape::Given { lengths: Some(l), .. } => l.iter().sum(),
-            _ => spec.centerline.windows(2).map(|p| p[0].distance(p[1])).sum(),
+            _ => {
+                let points = &spec.centerline;
+                let closing = spec.closure.map_or(0.0, |_| points[0].distance(points[points.len() - 1]));
+                points.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>() + closing
+            }
         }
     }
 

@@ -18,11 +18,15 @@ impl<'d> Loader<'d> {
         let hint = table.vector("d1", Dim::NUMBER);
         let twist = table.quantity_or("twist", Dim::ANGLE, 0.0);
         let (roll, pretwist) = (table.quantity_or("roll", Dim::ANGLE, 0.0), table.quantity_or("pretwist", Dim::ANGLE, 0.0));
+        let closed = table.truth_or("closed", false);
+        if closed && let Some(v) = table.get("d1") {
+            v.problem("a closed thread turns its section by `roll`", None);
+        }
         let rest_value = table.get("rest");
         let (Some(points), Some((section, radius, size)), Some((material, modulus, density))) = (points, shape, material) else {
             // What is missing was reported; a stand-in keeps the numbers of the following threads right.
             if let Some(rest) = rest_value {
-                let _ = self.rest(&rest, 1);
+                let _ = self.rest(&rest, 1, closed);
             }
             let spec = RodSpec::straight(DVec3::ZERO, DVec3::X, 1, 1e-3, Material::elastic(1e9, 1e3));
             self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
@@ -31,10 +35,19 @@ impl<'d> Loader<'d> {
         let mut spec = RodSpec { section, roll, pretwist, along: Along { size, modulus, density }, ..RodSpec::new(points, radius, material) };
         spec.stretch = stretch.unwrap_or(Stretch::Elastic);
         spec.surface = surface;
-        if let Some(rest) = rest_value {
-            spec.rest = self.rest(&rest, spec.centerline.len() - 1).unwrap_or(RestShape::Straight);
+        if closed {
+            // A centerline that comes back to its start names that point twice.
+            let points = &mut spec.centerline;
+            let n = points.len();
+            if n > 3 && points[n - 1].distance(points[0]) < 0.5 * points[1].distance(points[0]) {
+                points.pop();
+            }
+            spec.closure = Some(Closure { twist });
         }
-        if hint.is_some() || twist != 0.0 {
+        if let Some(rest) = rest_value {
+            spec.rest = self.rest(&rest, n_elements(&spec), closed).unwrap_or(RestShape::Straight);
+        }
+        if !closed && (hint.is_some() || twist != 0.0) {
             spec.frames = frames(&spec.centerline, hint, twist);
         }
         self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
@@ -261,7 +274,7 @@ impl<'d> Loader<'d> {
         fine.then(|| Curve::new(pieces))
     }
 
-    pub(super) fn rest(&self, value: &Value<'d>, n: usize) -> Option<RestShape> {
+    pub(super) fn rest(&self, value: &Value<'d>, n: usize, closed: bool) -> Option<RestShape> {
         if value.is_text() {
             return value.choice(&[("straight", RestShape::Straight), ("as_inserted", RestShape::AsInserted)]);
         }
@@ -275,7 +288,9 @@ impl<'d> Loader<'d> {
             let points = points?;
             let q = frames(&points, hint, twist)?;
             let lengths: Vec<f64> = points.windows(2).map(|p| p[0].distance(p[1])).collect();
-            let darboux = (1..n).map(|j| log((q[j - 1].conjugate() * q[j]).normalize()) / (0.5 * (lengths[j - 1] + lengths[j]))).collect();
+            let joints = if closed { n } else { n - 1 };
+            let next = |j: usize| (j + 1) % n;
+            let darboux = (0..joints).map(|j| log((q[j].conjugate() * q[next(j)]).normalize()) / (0.5 * (lengths[j] + lengths[next(j)]))).collect();
             return Some(RestShape::Given { lengths: Some(lengths), darboux: Some(darboux) });
         }
         let curvature = match t.get("curvature") {
@@ -293,7 +308,37 @@ impl<'d> Loader<'d> {
         let length = positive(&t, "length", Dim::LENGTH);
         t.finish();
         let (k1, k2) = curvature?;
-        Some(RestShape::Given { lengths: length.map(|l| vec![l / n as f64; n]), darboux: Some(vec![DVec3::new(k1, k2, twist); n.saturating_sub(1)]) })
+        Some(RestShape::Given {
+            lengths: length.map(|l| vec![l / n as f64; n]),
+            darboux: Some(vec![DVec3::new(k1, k2, twist); if closed { n } else { n.saturating_sub(1) }]),
+        })
+    }
+
+    /// Places that are joined.
+    pub(super) fn weld(&self, table: &Table<'d>) -> Option<WeldDef> {
+        let value = table.need("places", "an array of places such as { thread = \"a\", at = \"end\" }")?;
+        let mut places = Vec::new();
+        for item in value.array("an array of places such as { thread = \"a\", at = \"end\" }")? {
+            let t = item.table()?;
+            let thread = self.thread_of(&t);
+            let place = t.need("at", "start, end, middle, a length or \"particle 3\"").zip(thread).and_then(|(v, thread)| self.place(&v, thread));
+            t.finish();
+            places.push((thread?, place?));
+        }
+        let rest = match table.get("rest") {
+            Some(v) => v.choice(&[("as_inserted", WeldRest::AsInserted), ("straight", WeldRest::Straight)])?,
+            None => WeldRest::AsInserted,
+        };
+        Some(WeldDef { places, rest, location: table.location() })
+    }
+
+    /// A reel at an end of a thread.
+    pub(super) fn reel(&self, table: &Table<'d>) -> Option<ReelDef> {
+        let thread = self.thread_of(table);
+        let at_end = table.need("at", "start or end").and_then(|v| v.choice(&[("start", false), ("end", true)]));
+        let law = reel_law(table);
+        let supply = in_range(table, "supply", Dim::LENGTH, 0.0, 1e6);
+        Some(ReelDef { thread: thread?, at_end: at_end?, law: law?, supply, location: table.location() })
     }
 
     pub(super) fn shape(&mut self, table: &Table<'d>) {
@@ -429,6 +474,11 @@ fn names_of_materials() -> String {
 }
 
 /// Frames along points, the first director nearest to `hint`, turned evenly by `twist` over the length.
+/// Elements of a thread.
+pub(super) fn n_elements(spec: &RodSpec) -> usize {
+    spec.centerline.len() - usize::from(spec.closure.is_none())
+}
+
 fn frames(points: &[DVec3], hint: Option<DVec3>, twist: f64) -> Option<Vec<DQuat>> {
     let distinct = points.windows(2).all(|p| p[0].distance(p[1]) > 0.0);
     if !distinct {
@@ -438,4 +488,16 @@ fn frames(points: &[DVec3], hint: Option<DVec3>, twist: f64) -> Option<Vec<DQuat
     let q = transported_frames(points, hint.or(bend).unwrap_or(DVec3::ZERO));
     let n = q.len() as f64;
     Some(q.iter().enumerate().map(|(i, q)| (*q * exp(DVec3::Z * (twist * (i as f64 + 0.5) / n))).normalize()).collect())
+}
+
+/// `rate` or `brake`.
+pub(super) fn reel_law(table: &Table<'_>) -> Option<ReelLaw> {
+    match (table.get("rate"), table.get("brake")) {
+        (Some(v), None) => in_range_value(&v, Dim::SPEED, -100.0, 100.0).map(ReelLaw::Rate),
+        (None, Some(v)) => positive_value(&v, Dim::FORCE).map(ReelLaw::Brake),
+        _ => {
+            table.problem("either `rate`, a speed, or `brake`, a force", None);
+            None
+        }
+    }
 }

@@ -38,6 +38,9 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
     state.time = interval.start + interval.length;
 }
 
+/// Why a substep is rejected whose numbers are not finite.
+const NOT_FINITE: &str = "not finite";
+
 /// Accepted substeps of one length before twice the length is tried again.
 const CALM: u32 = 6;
 
@@ -58,16 +61,19 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
     let verdict = if !outcome.finite {
-        Err("not finite")
+        Err(NOT_FINITE)
     } else if !outcome.converged && depth < model.settings.halvings {
         Err("not converged")
     } else {
         collide::sweep(model, state, scratch)
     };
+    let last = state.last_h;
+    let verdict = verdict.and_then(|clearance| {
+        accept(model, state, scratch, h);
+        if crate::rod::in_proportion(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
+    });
     match verdict {
         Ok(clearance) => {
-            let last = state.last_h;
-            accept(model, state, scratch, h);
             state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
             state.time = t + h;
@@ -91,7 +97,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
             }
-            let kind = if outcome.finite { IncidentKind::Stuck { reason } } else { IncidentKind::NotFinite };
+            let kind = if reason == NOT_FINITE { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
             report.incidents.push(Incident { time: t, kind });
             report.converged = false;
             state.last_h = 0.0;

@@ -266,6 +266,8 @@ impl RodSpec {
         for (section, l) in sections.iter().zip(&rest_lengths) {
             let stiffness = (section.ea + section.bend.max_element()) / l;
             check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
+            let least = section.bend.min_element().min(section.kga).min(section.mass).min(section.inertia.min_element());
+            check(what, "section", least, least.is_normal(), "sizes, moduli and densities whose products are no smaller than the least number")?;
         }
         let flat = sections.iter().any(|s| s.bend.x != s.bend.y);
         if self.material.plasticity.is_some() && flat {

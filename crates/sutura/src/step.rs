@@ -70,7 +70,8 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
     let last = state.last_h;
     let verdict = verdict.and_then(|clearance| {
         accept(model, state, scratch, h);
-        if crate::rod::in_proportion(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
+        let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
+        if clear && all_finite(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
     });
     match verdict {
         Ok(clearance) => {
@@ -107,6 +108,18 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
             false
         }
     }
+}
+
+/// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of finite ones.
+fn all_finite(model: &Model, state: &State) -> bool {
+    let grips = state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
+    let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
+    let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
+    let on_shapes = state.shape_contacts.iter().all(|c| {
+        let arm = state.position[c.element as usize] - state.shape_pose[c.shape as usize].position;
+        arm.cross(c.normal * c.normal_force + c.friction).is_finite()
+    });
+    grips && shapes && threads && on_shapes && crate::rod::in_proportion(model, state)
 }
 
 fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {

@@ -169,15 +169,16 @@ impl RodSpec {
         check(what, "radius", self.radius, self.radius > 0.0, "a finite length > 0 [m]")?;
         self.section.validate()?;
         self.along.validate()?;
-        check(what, "roll", self.roll, true, "a finite angle [rad]")?;
+        // Of a larger angle no digit says how far the last turn went.
+        check(what, "roll", self.roll, self.roll.abs() < 1e12, "a finite angle under 1e12 [rad]")?;
         check(what, "pretwist", self.pretwist, true, "a finite angle [rad]")?;
         let points = &self.centerline;
         if points.len() < 2 {
             return Err(Error::invalid(what, "centerline", format!("{} points", points.len()), "at least 2 points"));
         }
         for (i, p) in points.iter().enumerate() {
-            if !p.is_finite() {
-                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates [m]"));
+            if !crate::math::is_place(*p) {
+                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates whose squares are finite too [m]"));
             }
         }
         let n = points.len() - 1;
@@ -252,10 +253,10 @@ impl RodSpec {
             .collect();
         if self.roll != 0.0 || self.pretwist != 0.0 {
             let rate = self.pretwist / rest_lengths.iter().sum::<f64>();
+            let evenly = rest_lengths.iter().all(|l| (rate * l).abs() < 3.0) && middles.iter().all(|s| (rate * s).is_finite());
+            check(what, "pretwist", self.pretwist, evenly, "under 3 rad per element")?;
             let turn: Vec<DQuat> = middles.iter().map(|s| exp(DVec3::Z * (self.roll + rate * s))).collect();
             for j in 1..n {
-                let angle = rate * (middles[j] - middles[j - 1]);
-                check(what, "pretwist", self.pretwist, angle.is_finite() && angle.abs() < 3.0, "under 3 rad per element")?;
                 rest_half[j] = half((turn[j - 1].conjugate() * (rest_half[j] * rest_half[j]) * turn[j]).normalize());
             }
             for (frame, turn) in frames.iter_mut().zip(&turn) {

@@ -148,8 +148,7 @@ impl Trajectory {
     /// The bytes of the file: `SUTURATR`, version, header length, header as JSON, number of frames, frames, checksum.
     pub fn to_bytes(&self) -> Vec<u8> {
         let header = serde_json::to_vec(&self.header).unwrap_or_default();
-        let mut out = Vec::with_capacity(64 + header.len() + self.frames.len() * self.frame_bytes());
-        out.extend_from_slice(MAGIC);
+        let mut out = MAGIC.to_vec();
         out.extend_from_slice(&VERSION.to_le_bytes());
         out.extend_from_slice(&(header.len() as u32).to_le_bytes());
         out.extend_from_slice(&header);
@@ -174,11 +173,6 @@ impl Trajectory {
         out
     }
 
-    fn frame_bytes(&self) -> usize {
-        let threads: usize = self.header.threads.iter().map(|t| 12 * (t.elements + 1) + 16 * t.elements).sum();
-        8 + threads + 28 * self.header.shapes.len() + 12 * self.header.grips.len()
-    }
-
     /// Reads what [`Trajectory::to_bytes`] wrote.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TrajectoryError> {
         let damaged = |why: &str| TrajectoryError::Damaged(why.into());
@@ -200,7 +194,7 @@ impl Trajectory {
         let count = reader.u64().ok_or_else(short)?;
         let mut trajectory = Trajectory { header, frames: Vec::new() };
         // The size must fit before anything is allocated for it.
-        let wanted = trajectory.checked_frame_bytes().and_then(|b| b.checked_mul(count));
+        let wanted = trajectory.frame_bytes().and_then(|b| b.checked_mul(count));
         if wanted != Some((reader.bytes.len() - reader.at) as u64) {
             return Err(damaged("the number of frames does not fit the length of the file"));
         }
@@ -214,7 +208,8 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    fn checked_frame_bytes(&self) -> Option<u64> {
+    /// Bytes of a frame, by the header; `None` where they are beyond counting.
+    fn frame_bytes(&self) -> Option<u64> {
         // The counts of shapes and grips are those of what was read, so their bytes are few.
         let mut sum = 8 + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64;
         for t in &self.header.threads {

@@ -568,10 +568,9 @@ impl World {
         let threads = s.thread_contacts.iter().all(|c| {
             element(c.a) && element(c.b) && c.a < c.b && place(c.s) && place(c.t) && forces(c.normal, c.normal_force, c.friction) && c.drift.is_finite()
         });
-        let shapes = s
-            .shape_contacts
-            .iter()
-            .all(|c| element(c.element) && self.model.shapes.at(c.shape).is_some() && place(c.s) && forces(c.normal, c.normal_force, c.friction));
+        let shapes = s.shape_contacts.iter().all(|c| {
+            element(c.element) && self.model.shapes.at(c.shape).is_some() && place(c.s) && forces(c.normal, c.normal_force, c.friction) && c.drift.is_finite()
+        });
         if !(threads && shapes) {
             return Err("a contact is out of range");
         }

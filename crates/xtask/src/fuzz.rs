@@ -4,7 +4,6 @@
 //! compiler, so that neither cargo-fuzz nor a nightly toolchain has to be there: only a C++ compiler.
 
 use crate::tally::{Tally, cargo, root, target};
-use std::collections::VecDeque;
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -74,20 +73,17 @@ pub fn run(tally: &mut Tally, only: Option<&str>, seconds: f64) {
 /// Runs a fuzzer to its end: what it did in words, or the last lines of what it printed.
 fn watch(command: &mut Command) -> Result<String, String> {
     // A line for all that is new, then the fault or the counts.
-    const LAST: usize = 50;
+    const SHOWN: usize = 50;
     let mut child = command.stdin(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(|e| format!("{}: {e}", command.get_program().display()))?;
-    let mut last = VecDeque::new();
+    let mut lines = Vec::new();
     if let Some(out) = child.stderr.take() {
-        for line in BufReader::new(out).split(b'\n').map_while(Result::ok) {
-            last.push_back(String::from_utf8_lossy(&line).into_owned());
-            if last.len() > LAST {
-                last.pop_front();
-            }
-        }
+        lines.extend(BufReader::new(out).split(b'\n').map_while(Result::ok).map(|l| String::from_utf8_lossy(&l).into_owned()));
     }
     let status = child.wait().map_err(|e| e.to_string())?;
-    let last = Vec::from(last);
-    if status.success() { Ok(summary(&last)) } else { Err(format!("{status}\n{}", last.join("\n"))) }
+    if status.success() {
+        return Ok(summary(&lines));
+    }
+    Err(format!("{status}\n{}", lines[lines.len().saturating_sub(SHOWN)..].join("\n")))
 }
 
 /// Inputs tried and places of the code reached, from what libFuzzer prints at its end.

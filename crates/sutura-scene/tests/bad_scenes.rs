@@ -106,7 +106,7 @@ fn slips_are_named_with_line_key_and_suggestion() {
         ("\"[100, 0, 0] mm\"", "\"[0, 0, 0] mm\"", 7, "thread[0].line", "no length", ""),
         ("elements = 20", "elements = 50001", 6, "thread[0].elements", "50000", ""),
         ("max_duration = \"1 s\"", "max_duration = \"1e9 s\"", 16, "phase[0]", "frames, at most", ""),
-        ("[[thread]]", "solver = { substep = \"1 ps\" }\n[[thread]]", 2, "solver.substep", "substeps in a frame, at most", ""),
+        ("[[thread]]", "solver = { substep = 1e-12 }\n[[thread]]", 2, "solver.substep", "substeps in a frame, at most", ""),
         ("name = \"pull\"", "name = \"pull", 17, "", "", ""),
     ] {
         assert!(GOOD.contains(from), "{from}");

@@ -104,6 +104,11 @@ fn build(tally: &mut Tally) -> Option<PathBuf> {
         tally.skip("fuzzing", &format!("there is no C++ compiler `{compiler}` for libFuzzer; the corpus is replayed by the tests"));
         return None;
     }
+    // Apart from the build, so that a machine without a network is told from a fuzzer that does not build.
+    if !cargo(&["fetch", "--quiet", "--manifest-path", "fuzz/Cargo.toml"]).status().is_ok_and(|s| s.success()) {
+        tally.skip("fuzzing", "libFuzzer cannot be fetched (the reason is above); the corpus is replayed by the tests");
+        return None;
+    }
     let folder = target().join("fuzz");
     // Named, so that build scripts and macros are built without the flags.
     let mut command = cargo(&["build", "--quiet", "--release", "--manifest-path", "fuzz/Cargo.toml", "--target", &host, "--target-dir"]);

@@ -3,10 +3,9 @@
 use crate::args::{EndsOption, Knot};
 use crate::{say, say_json};
 use anyhow::{Context as _, bail};
-use std::path::Path;
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, KnotType, recognize};
-use sutura_scene::Trajectory;
+use sutura_scene::{Trajectory, points_from_table};
 
 /// What is printed as JSON.
 #[derive(serde::Serialize)]
@@ -113,7 +112,7 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
         if args.frame.is_some() || args.time.is_some() || args.thread.is_some() {
             bail!("{}: not a trajectory, so --frame, --time and --thread mean nothing", file.display());
         }
-        return Ok(Curve { points: read_table(file, &bytes)?, time: None, thread: None });
+        return Ok(Curve { points: points_from_table(&bytes).with_context(|| file.display().to_string())?, time: None, thread: None });
     }
     let trajectory = Trajectory::from_bytes(&bytes).with_context(|| file.display().to_string())?;
     let count = trajectory.frames.len();
@@ -139,34 +138,6 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
         time: Some(frame.time),
         thread: threads.get(k).map(|t| t.name.clone()),
     })
-}
-
-/// Points from a table. The first row may hold headings; when they name x, y and z, those columns are taken, otherwise the first three.
-fn read_table(file: &Path, bytes: &[u8]) -> anyhow::Result<Vec<DVec3>> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
-    let mut columns = [0, 1, 2];
-    let mut points = Vec::new();
-    for (row, record) in reader.records().enumerate() {
-        let record = record.with_context(|| file.display().to_string())?;
-        let line = record.position().map_or(0, csv::Position::line);
-        if row == 0 && record.iter().take(3).all(|f| f.parse::<f64>().is_err()) {
-            let named = |name: &str| record.iter().position(|f| f.split([' ', '[', '(']).next().is_some_and(|w| w.eq_ignore_ascii_case(name)));
-            if let (Some(x), Some(y), Some(z)) = (named("x"), named("y"), named("z")) {
-                columns = [x, y, z];
-            }
-            continue;
-        }
-        let mut p = [0.0; 3];
-        for (v, &column) in p.iter_mut().zip(&columns) {
-            let field = record.get(column).with_context(|| format!("{}:{line}: {} columns, wanted x, y, z", file.display(), record.len()))?;
-            *v = field.parse().ok().filter(|v: &f64| v.is_finite()).with_context(|| format!("{}:{line}: `{field}` is not a finite number", file.display()))?;
-        }
-        points.push(DVec3::from(p));
-    }
-    if points.len() < 3 {
-        bail!("{}: {} points, wanted at least 3 (comma-separated x, y, z)", file.display(), points.len());
-    }
-    Ok(points)
 }
 
 /// Ends held by instruments that came from outside: each ray leads away from the middle of the thread.

@@ -106,9 +106,9 @@ impl Curve {
         Some(points)
     }
 
-    /// Length reached by n steps of one chord.
+    /// Length reached by n steps of one chord; where points are not asked for, no farther than beyond the end.
     fn march(&self, n: usize, chord: f64, mut points: Option<&mut Vec<DVec3>>) -> f64 {
-        let (mut s, mut x) = (0.0, self.at(0.0));
+        let (mut s, mut x, total) = (0.0, self.at(0.0), self.length());
         if let Some(p) = points.as_deref_mut() {
             p.push(x);
         }
@@ -125,8 +125,10 @@ impl Curve {
             }
             s = 0.5 * (near + far);
             x = self.at(s);
-            if let Some(p) = points.as_deref_mut() {
-                p.push(x);
+            match points.as_deref_mut() {
+                Some(p) => p.push(x),
+                None if s > total => break,
+                None => {}
             }
         }
         s

@@ -20,6 +20,7 @@ mod saved;
 mod scene;
 mod set;
 mod stage;
+mod table;
 mod trajectory;
 mod units;
 mod watch;
@@ -32,4 +33,5 @@ pub use report::{
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
 pub use scene::{Camera, Scene};
+pub use table::{TableError, points_from_table};
 pub use trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory, TrajectoryError};

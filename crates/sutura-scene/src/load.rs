@@ -12,8 +12,8 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Take, ThreadDef, Wanted,
-    WeldDef, engine_place,
+    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Take,
+    ThreadDef, Wanted, WeldDef, engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};
 use std::path::{Path, PathBuf};
@@ -42,6 +42,7 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
         doc: &doc,
         folder,
         names: Names::default(),
+        frame_rate: 60.0,
         surfaces: Vec::new(),
         threads: Vec::new(),
         shapes: Vec::new(),
@@ -71,6 +72,7 @@ struct Loader<'d> {
     doc: &'d Doc,
     folder: PathBuf,
     names: Names,
+    frame_rate: f64,
     surfaces: Vec<String>,
     threads: Vec<ThreadDef>,
     shapes: Vec<ShapeDef>,
@@ -79,6 +81,9 @@ struct Loader<'d> {
     loads: Vec<String>,
     phases: Vec<String>,
 }
+
+/// Most substeps of a frame.
+const MOST_SUBSTEPS: i64 = 100_000;
 
 impl<'d> Loader<'d> {
     fn scene(&mut self, root: &Table<'d>, file_name: &str) -> Option<Scene> {
@@ -99,7 +104,8 @@ impl<'d> Loader<'d> {
         let start = root.get("start").and_then(|v| Some((self.folder.join(v.text()?.as_ref()), v.location())));
 
         self.surfaces = vec!["thread".into(), "shape".into()];
-        let (settings, solver_location) = self.solver(root, frame_rate);
+        self.frame_rate = frame_rate;
+        let (settings, solver_location) = self.solver(root);
         for table in root.tables("thread") {
             self.thread(&table);
             table.finish();
@@ -138,6 +144,12 @@ impl<'d> Loader<'d> {
             root.problem("there is no `[[phase]]`: nothing would happen", Some("for instance [[phase]] with name = \"run\" and duration = \"1 s\"".into()));
         }
         let phases: Vec<Phase> = phase_tables.iter().enumerate().filter_map(|(i, t)| self.phase(t, i)).collect();
+        let frames = frame_rate * phases.iter().map(Phase::longest).sum::<f64>();
+        let longest = phase_tables.iter().zip(&phases).max_by(|a, b| a.1.longest().total_cmp(&b.1.longest()));
+        if let Some((table, phase)) = longest.filter(|_| frames > MOST_FRAMES) {
+            let problem = format!("it may take {:e} s: with the other phases {frames:e} frames, at most {MOST_FRAMES:e} are run", phase.longest());
+            table.problem(problem, None);
+        }
         let profiles = root.tables("profile").iter().filter_map(|t| self.profile(t)).collect();
         let checks = root.tables("check").iter().enumerate().filter_map(|(i, t)| self.check(t, i)).collect();
 
@@ -342,14 +354,14 @@ impl<'d> Loader<'d> {
 
     // ---- solver and friction ----
 
-    fn solver(&self, root: &Table<'d>, frame_rate: f64) -> (Settings, Location) {
+    fn solver(&self, root: &Table<'d>) -> (Settings, Location) {
         let mut settings = Settings::default();
         let Some(table) = root.get("solver").and_then(|v| v.table()) else { return (settings, root.location()) };
         if let Some(v) = table.vector("gravity", Dim::ACCELERATION) {
             settings.gravity = v;
         }
         if let Some(v) = table.get("substeps") {
-            settings.substep = 1.0 / (frame_rate * v.integer(1, 100_000).unwrap_or(1) as f64);
+            settings.substep = 1.0 / (self.frame_rate * v.integer(1, MOST_SUBSTEPS).unwrap_or(1) as f64);
             if table.has("substep") {
                 v.problem("`substep` and `substeps` exclude each other", None);
             }
@@ -365,6 +377,12 @@ impl<'d> Loader<'d> {
     /// The numbers that an action may change too.
     fn solver_numbers(&self, table: &Table<'d>, settings: &mut Settings) {
         if let Some(v) = positive(table, "substep", Dim::TIME) {
+            let substeps = 1.0 / (self.frame_rate * v);
+            if substeps > MOST_SUBSTEPS as f64 * (1.0 + 1e-9)
+                && let Some(value) = table.get("substep")
+            {
+                value.problem(format!("{v:e} s: {substeps:e} substeps in a frame, at most {MOST_SUBSTEPS} are taken"), None);
+            }
             settings.substep = v;
         }
         if let Some(v) = table.get("newton_max").and_then(|v| v.integer(1, 1000)) {

@@ -2,7 +2,7 @@
 
 use crate::error::SceneError;
 use crate::report::{Clearance, FrameTimes, IncidentReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WorkReport};
-use crate::scene::{End, Late, Moment, Scene};
+use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
 use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory};
 use crate::watch::{Check, Probe, profile};
@@ -132,18 +132,24 @@ impl Runner {
             self.look();
             self.stuck = if stuck { self.stuck + 1 } else { 0 };
             if self.stuck >= GIVE_UP {
-                self.incident(None, format!("given up: {GIVE_UP} frames in a row found no acceptable substep"));
-                self.late = true;
-                self.end_phase("given up");
-                self.finished = true;
+                self.give_up(format!("given up: {GIVE_UP} frames in a row found no acceptable substep"));
             } else {
                 self.end_phase_when_due();
+                if !self.finished && self.frame as f64 >= MOST_FRAMES {
+                    self.give_up(format!("given up after {MOST_FRAMES:e} frames"));
+                }
             }
             if self.finished || self.frame.is_multiple_of(self.scene.record_every) {
                 self.record();
             }
         }
         self.progress()
+    }
+
+    fn give_up(&mut self, why: String) {
+        self.incident(None, why);
+        self.end_phase("given up");
+        (self.late, self.finished) = (true, true);
     }
 
     /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.

@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
 use sutura::{Friction, Hold, Place, ReelLaw, RodSpec, Settings, ShapeSpec, WeldRest};
 
+/// Most frames of a run: two days at 60 a second. What is recorded and probed is kept in memory.
+pub(crate) const MOST_FRAMES: f64 = 1e7;
+
 /// A scene, read from a file and checked.
 #[derive(Debug, Clone)]
 pub struct Scene {

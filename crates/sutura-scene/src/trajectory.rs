@@ -148,8 +148,7 @@ impl Trajectory {
     /// The bytes of the file: `SUTURATR`, version, header length, header as JSON, number of frames, frames, checksum.
     pub fn to_bytes(&self) -> Vec<u8> {
         let header = serde_json::to_vec(&self.header).unwrap_or_default();
-        let mut out = Vec::with_capacity(64 + header.len() + self.frames.len() * self.frame_bytes());
-        out.extend_from_slice(MAGIC);
+        let mut out = MAGIC.to_vec();
         out.extend_from_slice(&VERSION.to_le_bytes());
         out.extend_from_slice(&(header.len() as u32).to_le_bytes());
         out.extend_from_slice(&header);
@@ -174,11 +173,6 @@ impl Trajectory {
         out
     }
 
-    fn frame_bytes(&self) -> usize {
-        let threads: usize = self.header.threads.iter().map(|t| 12 * (t.elements + 1) + 16 * t.elements).sum();
-        8 + threads + 28 * self.header.shapes.len() + 12 * self.header.grips.len()
-    }
-
     /// Reads what [`Trajectory::to_bytes`] wrote.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TrajectoryError> {
         let damaged = |why: &str| TrajectoryError::Damaged(why.into());
@@ -200,23 +194,37 @@ impl Trajectory {
         let count = reader.u64().ok_or_else(short)?;
         let mut trajectory = Trajectory { header, frames: Vec::new() };
         // The size must fit before anything is allocated for it.
-        let wanted = trajectory.checked_frame_bytes().and_then(|b| b.checked_mul(count));
+        let wanted = trajectory.frame_bytes().and_then(|b| b.checked_mul(count));
         if wanted != Some((reader.bytes.len() - reader.at) as u64) {
             return Err(damaged("the number of frames does not fit the length of the file"));
         }
-        for _ in 0..count {
+        for i in 0..count {
             let frame = reader.frame(&trajectory.header).ok_or_else(short)?;
+            if !frame.is_finite() {
+                return Err(TrajectoryError::Damaged(format!("a number of frame {i} is not finite")));
+            }
             trajectory.frames.push(frame);
         }
         Ok(trajectory)
     }
 
-    fn checked_frame_bytes(&self) -> Option<u64> {
-        let mut sum: u64 = 8;
+    /// Bytes of a frame, by the header; `None` where they are beyond counting.
+    fn frame_bytes(&self) -> Option<u64> {
+        // The counts of shapes and grips are those of what was read, so their bytes are few.
+        let mut sum = 8 + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64;
         for t in &self.header.threads {
             sum = sum.checked_add((t.elements as u64).checked_mul(28)?.checked_add(12)?)?;
         }
-        Some(sum + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64)
+        Some(sum)
+    }
+}
+
+impl Frame {
+    fn is_finite(&self) -> bool {
+        let points = self.positions.iter().flatten().flatten().chain(self.grips.iter().flatten().flatten());
+        let poses = self.shapes.iter().flat_map(|(x, q)| x.iter().chain(q));
+        let mut numbers = points.chain(self.orientations.iter().flatten().flatten()).chain(poses);
+        self.time.is_finite() && numbers.all(|v| v.is_finite())
     }
 }
 
@@ -312,6 +320,18 @@ mod tests {
         let t = sample();
         assert_eq!(Trajectory::from_bytes(&t.to_bytes()).unwrap(), t);
         assert_eq!(t.nearest(0.4).unwrap().time, 0.5);
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused_and_a_header_beyond_proportion_too() {
+        let mut t = sample();
+        t.frames[1].positions[0][2][1] = f32::NAN;
+        assert!(Trajectory::from_bytes(&t.to_bytes()).unwrap_err().to_string().contains("frame 1"));
+        // The bytes of a frame of so many elements just fit 64 bits, with those of the shape they do not.
+        let mut t = sample();
+        t.frames.clear();
+        t.header.threads[0].elements = ((u64::MAX - 20) / 28) as usize;
+        assert!(Trajectory::from_bytes(&t.to_bytes()).is_err());
     }
 
     #[test]

@@ -104,6 +104,9 @@ fn slips_are_named_with_line_key_and_suggestion() {
         ("elements = 20", "radius = [[0, 1e-4]]\nsection = { ellipse = [1e-4, 2e-4] }\nelements = 20", 6, "thread[0].radius", "one radius", "`section_scale`"),
         ("elements = 20", "elements = 20\npretwist = \"1 mm\"", 7, "thread[0].pretwist", "a length, wanted an angle", ""),
         ("\"[100, 0, 0] mm\"", "\"[0, 0, 0] mm\"", 7, "thread[0].line", "no length", ""),
+        ("elements = 20", "elements = 50001", 6, "thread[0].elements", "50000", ""),
+        ("max_duration = \"1 s\"", "max_duration = \"1e9 s\"", 16, "phase[0]", "frames, at most", ""),
+        ("[[thread]]", "solver = { substep = 1e-12 }\n[[thread]]", 2, "solver.substep", "substeps in a frame, at most", ""),
         ("name = \"pull\"", "name = \"pull", 17, "", "", ""),
     ] {
         assert!(GOOD.contains(from), "{from}");
@@ -131,6 +134,14 @@ fn what_only_the_engine_knows_is_named_with_the_line_too() {
     let e = error(&twice);
     assert_eq!(e.problems[0].line, Some(2));
     assert!(e.to_string().contains("centerline[0..1]"), "{e}");
+}
+
+/// Each thread is small enough, all together are not.
+#[test]
+fn elements_are_counted_over_all_threads() {
+    let second = "[[thread]]\nname = \"other\"\nsize = \"3-0\"\nmaterial = \"silk\"\nelements = 49981\nline = { from = [0, 1, 0], to = [1, 1, 0] }\n[[shape]]";
+    let e = error(&GOOD.replacen("[[shape]]", second, 1));
+    assert!(e.problems.iter().any(|p| p.key == "thread[1].elements" && p.message.contains("50001")), "{e}");
 }
 
 #[test]

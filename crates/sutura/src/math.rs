@@ -50,8 +50,13 @@ impl Pose {
     }
     /// Whether every number is finite and the quaternion is a unit one.
     pub(crate) fn is_valid(&self) -> bool {
-        self.position.is_finite() && self.orientation.is_finite() && (self.orientation.length() - 1.0).abs() < 1e-6
+        is_place(self.position) && self.orientation.is_finite() && (self.orientation.length() - 1.0).abs() < 1e-6
     }
+}
+
+/// Whether a point is somewhere from which distances can be measured: its coordinates are finite, and so are their squares.
+pub(crate) fn is_place(x: DVec3) -> bool {
+    x.length_squared().is_finite()
 }
 
 /// Unit quaternion of the rotation vector `phi` \[rad\].

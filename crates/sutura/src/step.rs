@@ -44,6 +44,9 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     state.time = interval.start + interval.length;
 }
 
+/// Why a substep is rejected whose numbers are not finite.
+const NOT_FINITE: &str = "not finite";
+
 /// Accepted substeps of one length before twice the length is tried again.
 const CALM: u32 = 6;
 
@@ -76,17 +79,21 @@ fn advance(
     let outcome = newton::solve(model, state, scratch, h);
     report.newton_iterations += outcome.iterations;
     let verdict = if !outcome.finite {
-        Err("not finite")
+        Err(NOT_FINITE)
     } else if !outcome.converged && depth < model.settings.halvings {
         Err("not converged")
     } else {
         collide::sweep(model, state, scratch)
     };
+    let last = state.last_h;
+    let verdict = verdict.and_then(|clearance| {
+        reel::pay_out(model, state, &scratch.brakes);
+        accept(model, state, scratch, h);
+        let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
+        if clear && all_finite(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
+    });
     match verdict {
         Ok(clearance) => {
-            let last = state.last_h;
-            reel::pay_out(model, state, &scratch.brakes);
-            accept(model, state, scratch, h);
             state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
             state.time = t + h;
@@ -111,7 +118,7 @@ fn advance(
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
             }
-            let kind = if outcome.finite { IncidentKind::Stuck { reason } } else { IncidentKind::NotFinite };
+            let kind = if reason == NOT_FINITE { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
             report.incidents.push(Incident { time: t, kind });
             report.converged = false;
             state.last_h = 0.0;
@@ -121,6 +128,18 @@ fn advance(
             false
         }
     }
+}
+
+/// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of finite ones.
+fn all_finite(model: &Model, state: &State) -> bool {
+    let grips = state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
+    let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
+    let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
+    let on_shapes = state.shape_contacts.iter().all(|c| {
+        let arm = state.position[c.element as usize] - state.shape_pose[c.shape as usize].position;
+        arm.cross(c.normal * c.normal_force + c.friction).is_finite()
+    });
+    grips && shapes && threads && on_shapes && crate::rod::in_proportion(model, state)
 }
 
 fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {

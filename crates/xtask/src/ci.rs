@@ -1,5 +1,6 @@
 //! What the whole check consists of. A step that fails does not stop the others.
 
+use crate::fuzz;
 use crate::program::{self, Profile};
 use crate::tally::{Tally, cargo, root};
 use std::time::Duration;
@@ -9,6 +10,9 @@ const LEFT_OUT: &[(&str, &str)] = &[];
 
 /// The longest that a scene may take \[s\]: many times what the slowest takes on a slow machine; a scene that hangs is stopped.
 const LONGEST: Duration = Duration::from_secs(300);
+
+/// How long each fuzz target is tried \[s\], beyond its corpus, which the tests replay. `cargo xtask fuzz` takes longer.
+const FUZZING: f64 = 20.0;
 
 /// Scenes whose last state must be the same on every run and in every build: a free thread, and one in contact with a shape. The
 /// unoptimized build runs them too, so they are quick ones.
@@ -28,6 +32,7 @@ pub fn everything(tally: &mut Tally) {
     }
     scenes(tally, &[]);
     same_bits(tally);
+    fuzz::run(tally, None, FUZZING);
 }
 
 /// All tests, those of the documentation among them: the command in the README, which goes on after the first failure here so that the

@@ -2,6 +2,7 @@
 //! else; `.ci/run` only calls `cargo xtask ci`.
 
 mod ci;
+mod fuzz;
 mod program;
 mod release;
 mod tally;
@@ -14,6 +15,8 @@ cargo xtask ci               the whole check: format, lints, tests, documentatio
 cargo xtask test [ARGS]      all tests (`cargo test --workspace`), with a count at the end
 cargo xtask scenes [NAMES]   run sample scenes with the release build; all of them without names
 cargo xtask bench [ARGS]     `sutura bench` with the release build
+cargo xtask fuzz [TARGET] [--minutes M]
+                             fuzz one target or all, each for so long (10)
 cargo xtask bless            run the square knot and take its last picture for the README
 cargo xtask release          is this commit ready to be released? (changes nothing)";
 
@@ -23,7 +26,7 @@ fn main() -> ExitCode {
         println!("{HELP}");
         return ExitCode::SUCCESS;
     };
-    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench");
+    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench" | "fuzz");
     let mut tally = Tally::default();
     match command.as_str() {
         _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
@@ -31,6 +34,11 @@ fn main() -> ExitCode {
         "test" => ci::tests(&mut tally, rest),
         "scenes" => ci::scenes(&mut tally, rest),
         "bench" => program::bench(&mut tally, rest),
+        "fuzz" => {
+            if let Err(problem) = fuzz::command(&mut tally, rest) {
+                return usage(&problem);
+            }
+        }
         "bless" => program::bless(&mut tally),
         "release" => release::ready(&mut tally),
         "help" | "--help" | "-h" => {

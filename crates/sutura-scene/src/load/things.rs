@@ -2,8 +2,9 @@
 
 use super::*;
 
-/// Most elements of one thread: far beyond what runs in real time, and a slip of the pen must not fill the memory.
-const MAX_ELEMENTS: i64 = 200_000;
+/// Most elements of all threads together: far beyond what runs in real time, and a slip of the pen must not fill the memory or cut a
+/// centerline for minutes.
+const MAX_ELEMENTS: usize = 50_000;
 
 impl<'d> Loader<'d> {
     pub(super) fn thread(&mut self, table: &Table<'d>) {
@@ -143,7 +144,15 @@ impl<'d> Loader<'d> {
         const SHAPES: [&str; 5] = ["line", "arc", "helix", "points", "path"];
         let elements = match given {
             Some(n) => Some(n),
-            None => table.get("elements").and_then(|v| v.integer(1, MAX_ELEMENTS)).map(|n| n as usize),
+            None => table.get("elements").and_then(|v| {
+                let n = v.integer(1, MAX_ELEMENTS as i64)? as usize;
+                let before: usize = self.threads.iter().map(|t| t.spec.centerline.len() - 1).sum();
+                if before + n > MAX_ELEMENTS {
+                    v.problem(format!("{} elements with those of the threads before it, at most {MAX_ELEMENTS} are taken", before + n), None);
+                    return None;
+                }
+                Some(n)
+            }),
         };
         let found: Vec<Value<'d>> = SHAPES.iter().filter_map(|k| table.get(k)).collect();
         let [shape] = found.as_slice() else {

@@ -59,13 +59,18 @@ fn least_along([a, b]: [DVec3; 2], distance: impl Fn(DVec3) -> f64) -> f64 {
     at_s.min(at_t).min(at(0.0)).min(at(1.0))
 }
 
-/// First time in [0, 1] found at which `distance` is at most `limit`, or so near to it that `resolution` cannot tell, when
+/// How often one motion is looked at. What slides past at the distance `d` over the length `l` needs about `l / d` looks, so this is
+/// a slide of thousands of thread diameters in one substep.
+const MOST_LOOKS: u32 = 1 << 14;
+
+/// First time in [0, 1] found at which `distance` is at most `limit`, or so near to it that `resolution` or [`MOST_LOOKS`] cannot tell, when
 /// it changes by at most `rate` in the whole interval. Never misses one.
 pub(super) fn time_within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64) -> Option<f64> {
-    within(distance, rate, limit, resolution, (0.0, distance(0.0)), (1.0, distance(1.0)))
+    let mut looks = MOST_LOOKS;
+    within(distance, rate, limit, resolution, (0.0, distance(0.0)), (1.0, distance(1.0)), &mut looks)
 }
 
-fn within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64, from: (f64, f64), to: (f64, f64)) -> Option<f64> {
+fn within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64, from: (f64, f64), to: (f64, f64), looks: &mut u32) -> Option<f64> {
     let span = rate * (to.0 - from.0);
     if from.1 <= limit {
         return Some(from.0);
@@ -75,11 +80,12 @@ fn within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64
         return None;
     }
     let middle = 0.5 * (from.0 + to.0);
-    if span < resolution || middle <= from.0 || middle >= to.0 {
+    if span < resolution || middle <= from.0 || middle >= to.0 || *looks == 0 {
         return Some(middle);
     }
+    *looks -= 1;
     let middle = (middle, distance(middle));
-    within(distance, rate, limit, resolution, from, middle).or_else(|| within(distance, rate, limit, resolution, middle, to))
+    within(distance, rate, limit, resolution, from, middle, looks).or_else(|| within(distance, rate, limit, resolution, middle, to, looks))
 }
 
 #[cfg(test)]
@@ -136,6 +142,19 @@ mod tests {
                 prop_assert!(distance(t) <= 3e-6);
             }
         }
+    }
+
+    #[test]
+    fn a_slide_beyond_all_proportion_comes_to_an_end() {
+        // At twice the limit all along: found by nothing but the number of looks.
+        let calls = core::cell::Cell::new(0_u32);
+        let sliding = |_: f64| {
+            calls.set(calls.get() + 1);
+            2e-7
+        };
+        assert!(time_within(&sliding, 1e20, 1e-7, 1e-7).is_some());
+        assert!(calls.get() <= MOST_LOOKS + 2);
+        assert!(time_within(&sliding, 1e-4, 1e-7, 1e-7).is_none());
     }
 
     #[test]

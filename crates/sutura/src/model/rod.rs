@@ -198,7 +198,8 @@ impl RodSpec {
         check(what, "radius", self.radius, self.radius > 0.0, "a finite length > 0 [m]")?;
         self.section.validate()?;
         self.along.validate()?;
-        check(what, "roll", self.roll, true, "a finite angle [rad]")?;
+        // Of a larger angle no digit says how far the last turn went.
+        check(what, "roll", self.roll, self.roll.abs() < 1e12, "a finite angle under 1e12 [rad]")?;
         check(what, "pretwist", self.pretwist, true, "a finite angle [rad]")?;
         let closed = self.closure.is_some();
         if self.centerline.len() < if closed { 3 } else { 2 } {
@@ -208,8 +209,8 @@ impl RodSpec {
         points.extend(closed.then(|| points[0]));
         let points = &points;
         for (i, p) in points.iter().enumerate() {
-            if !p.is_finite() {
-                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates [m]"));
+            if !crate::math::is_place(*p) {
+                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates whose squares are finite too [m]"));
             }
         }
         let n = points.len() - 1;
@@ -297,11 +298,11 @@ impl RodSpec {
             .collect();
         if self.roll != 0.0 || self.pretwist != 0.0 {
             let rate = self.pretwist / rest_lengths.iter().sum::<f64>();
+            let evenly = rest_lengths.iter().all(|l| (rate * l).abs() < 3.0) && middles.iter().all(|s| (rate * s).is_finite());
+            check(what, "pretwist", self.pretwist, evenly, "under 3 rad per element")?;
             let turn: Vec<DQuat> = middles.iter().map(|s| exp(DVec3::Z * (self.roll + rate * s))).collect();
             for j in first_joint..n {
                 let before = (j + n - 1) % n;
-                let angle = if j == 0 { 0.0 } else { rate * (middles[j] - middles[before]) };
-                check(what, "pretwist", self.pretwist, angle.is_finite() && angle.abs() < 3.0, "under 3 rad per element")?;
                 rest_half[j] = half((turn[before].conjugate() * (rest_half[j] * rest_half[j]) * turn[j]).normalize());
             }
             for (frame, turn) in frames.iter_mut().zip(&turn) {
@@ -325,6 +326,8 @@ impl RodSpec {
         for (section, l) in sections.iter().zip(&rest_lengths) {
             let stiffness = (section.ea + section.bend.max_element()) / l;
             check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
+            let least = section.bend.min_element().min(section.kga).min(section.mass).min(section.inertia.min_element());
+            check(what, "section", least, least.is_normal(), "sizes, moduli and densities whose products are no smaller than the least number")?;
         }
         let flat = sections.iter().any(|s| s.bend.x != s.bend.y);
         if self.material.plasticity.is_some() && flat {

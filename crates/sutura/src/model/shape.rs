@@ -102,8 +102,8 @@ impl ShapeSpec {
                 length("half_sides.z", half_sides.z)?;
             }
             Geometry::Mesh { vertices, triangles } => {
-                if let Some(i) = vertices.iter().position(|v| !v.is_finite()) {
-                    return Err(Error::invalid(what, format!("vertices[{i}]"), vertices[i], "finite coordinates [m]"));
+                if let Some(i) = vertices.iter().position(|v| !crate::math::is_place(*v)) {
+                    return Err(Error::invalid(what, format!("vertices[{i}]"), vertices[i], "finite coordinates whose squares are finite too [m]"));
                 }
                 if triangles.is_empty() {
                     return Err(Error::invalid(what, "triangles", "none", "at least one triangle"));

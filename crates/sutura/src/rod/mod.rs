@@ -45,6 +45,25 @@ pub(crate) fn welded_joint(model: &Model, state: &State, rod: &RodModel, e: usiz
     })
 }
 
+/// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending and twist add no more
+/// than a stiffness times the square of half a turn.) So is the square of every distance.
+pub(crate) fn in_proportion(model: &Model, state: &State) -> bool {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for (_, rod) in model.rods.iter() {
+        for i in rod.particles() {
+            squares += state.position[i].length_squared();
+            sum += model.mass[i] * (state.velocity[i].length_squared() + model.settings.gravity.dot(state.position[i]).abs());
+        }
+        for e in rod.elements() {
+            let c = element_strain(model, state, e);
+            let w = state.angular_velocity[e];
+            sum += model.inertia[e].max_element() * w.length_squared() + (model.stretch_stiffness[e] * c).dot(c) + state.tension[e].abs();
+            sum += (model.bend_stiffness[e] * state.plastic[e]).dot(state.plastic[e]);
+        }
+    }
+    sum.is_finite() && (4.0 * squares).is_finite()
+}
+
 /// Mechanical energy of a rod.
 pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
     let mut sum = Energy::default();

@@ -103,6 +103,36 @@ fn absurd_threads() {
     }
 }
 
+/// Threads that give numbers that are not finite at once: refused, with the field.
+#[test]
+fn threads_that_are_no_threads() {
+    let (material, radius) = t1();
+    let refused = |spec: RodSpec, field: &str| {
+        let e = World::default().insert_rod(&spec).unwrap_err();
+        assert!(matches!(&e, Error::Invalid { field: f, .. } if f.starts_with(field)), "{field}: {e}");
+    };
+    let one = |from: DVec3, to: DVec3| RodSpec::straight(from, to, 1, radius, material.clone());
+    // One element has no joint at which its twist would show.
+    refused(RodSpec { pretwist: 1e300, ..one(DVec3::ZERO, DVec3::X * 0.01) }, "pretwist");
+    refused(RodSpec { roll: 1e300, ..straight() }, "roll");
+    // The middle of two points is not finite.
+    refused(one(DVec3::X * 1.7e308, DVec3::X * 1.6e308), "centerline");
+    // The second moment of area is less than the least number, and no distance is a finite number of diameters.
+    refused(RodSpec { radius: 1e-100, ..straight() }, "section");
+    refused(RodSpec { material: Material { density: 1e-300, ..material.clone() }, ..straight() }, "section");
+}
+
+/// Forces and positions that are finite, of which a reading is not: an incident, and the state is put back.
+#[test]
+fn readings_that_would_not_be_finite() {
+    let (mut world, rod) = thread(Settings { halvings: 2, ..Settings::default() });
+    let before = world.rod(rod).unwrap().positions().to_vec();
+    world.set_settings(Settings { gravity: DVec3::NEG_Z * 1e300, ..world.settings().clone() }).unwrap();
+    let report = step(&mut world, DT);
+    assert!(report.incidents.iter().any(|i| i.kind == IncidentKind::NotFinite), "{report:?}");
+    assert_eq!(world.rod(rod).unwrap().positions(), before);
+}
+
 #[test]
 fn absurd_loads_and_grips() {
     for x in [1e-300, 1e-30, 1e6, 1e30, 1e150, 1e300] {

@@ -1,0 +1,79 @@
+//! Snapshots from outside: refused, or the world goes on from them.
+
+use crate::finite;
+use crate::input::Input;
+use std::sync::OnceLock;
+use sutura::glam::DVec3;
+use sutura::{
+    Drive, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, RodSpec, Settings, ShapeMotion, ShapeSpec, Stretch, World,
+};
+
+/// Snapshots of the two worlds after some steps.
+static SNAPSHOTS: OnceLock<[Vec<u8>; 2]> = OnceLock::new();
+
+pub fn run(data: &[u8]) {
+    let mut input = Input::new(data);
+    let busy = input.truth();
+    let good = &SNAPSHOTS.get_or_init(|| [stepped(false), stepped(true)])[usize::from(busy)];
+    take_up(busy, &input.changed(good));
+}
+
+/// A snapshot of a world after some steps.
+fn stepped(busy: bool) -> Vec<u8> {
+    let mut world = world(busy);
+    for _ in 0..12 {
+        world.step(1.0 / 240.0);
+    }
+    world.snapshot()
+}
+
+fn take_up(busy: bool, bytes: &[u8]) {
+    let mut world = world(busy);
+    let before = world.state_hash();
+    if world.restore(bytes).is_err() {
+        assert_eq!(world.state_hash(), before, "a snapshot that was refused changed the world");
+        return;
+    }
+    assert_eq!(world.snapshot(), bytes, "what was read is not what was written");
+    finite::assert(finite::readings(&world));
+    for _ in 0..2 {
+        let report = world.step(1.0 / 240.0);
+        finite::assert(finite::report(&report));
+        finite::assert(finite::state(world.view()));
+        if report.incidents.is_empty() {
+            finite::assert(finite::readings(&world));
+        }
+    }
+    let again = world.snapshot();
+    assert!(world.restore(&again).is_ok(), "the world does not take its own snapshot");
+}
+
+/// A thread held at its start; or two threads, one across the other, on a post, with every kind of grip and load.
+fn world(busy: bool) -> World {
+    let build = || -> Result<World, sutura::Error> {
+        let mut world = World::new(Settings { halvings: 2, ..Settings::default() })?;
+        let set = Plasticity { yield_curvature: 200.0, yield_twist: 300.0, hardening: 0.1 };
+        let material = Material { bend_damping: 0.01, plasticity: Some(set), ..Material::elastic(2e9, 1150.0) };
+        let first = world.insert_rod(&RodSpec::straight(DVec3::new(-0.01, 0.0, 0.0), DVec3::new(0.01, 0.0, 0.0), 8, 1.5e-4, material.clone()))?;
+        world.insert_grip(&GripSpec::at_once(first, Place::Start, Hold::Clamp))?;
+        if !busy {
+            return Ok(world);
+        }
+        let across = RodSpec::straight(DVec3::new(0.0, -0.01, 3.0e-4), DVec3::new(0.0, 0.01, 3.0e-4), 8, 1.5e-4, material);
+        let second = world.insert_rod(&RodSpec { stretch: Stretch::Inextensible, ..across })?;
+        let post = Geometry::Cylinder { radius: 2e-3, half_length: 5e-3 };
+        world.insert_shape(&ShapeSpec::fixed(post, Pose::at(DVec3::new(3e-3, 0.0, -7.2e-3))))?;
+        let pushed = ShapeMotion::Pushed { direction: DVec3::Z, force: 0.01, speed_limit: 0.02 };
+        let ball = ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::new(6e-3, 0.0, -1.1e-3)));
+        world.insert_shape(&ShapeSpec { motion: pushed, ..ball })?;
+        world.insert_grip(&GripSpec::at_once(second, Place::Start, Hold::Jaw))?;
+        let drive = Drive::Force { direction: DVec3::Y, force: 0.1, speed_limit: 0.01 };
+        world.insert_grip(&GripSpec { drive, ..GripSpec::new(second, Place::End, Hold::Pin) })?;
+        world.insert_load(&LoadSpec { rod: first, kind: LoadKind::Mass { place: Place::End, mass: 1e-6, inertia: DVec3::splat(1e-14) } })?;
+        world.insert_load(&LoadSpec { rod: first, kind: LoadKind::Uniform { force_per_length: DVec3::Y * 1e-4 } })?;
+        let torque = LoadKind::Point { place: Place::Arc(5e-3), force: DVec3::ZERO, torque: DVec3::X * 1e-7 };
+        world.insert_load(&LoadSpec { rod: first, kind: torque })?;
+        Ok(world)
+    };
+    build().unwrap_or_else(|e| panic!("{e}"))
+}

@@ -7,6 +7,7 @@ pub mod audit;
 mod collide;
 pub mod error;
 pub mod handle;
+mod integrator;
 #[doc(hidden)]
 pub mod kernels;
 pub mod knot;
@@ -33,7 +34,7 @@ pub use model::material::{Material, Plasticity, Shear};
 pub use model::rod::{RestShape, Rod, RodSpec, Stretch, transported_frames};
 pub use model::section::{Along, Profile, Section};
 pub use model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
-pub use params::{Friction, Settings};
+pub use params::{Friction, Integrator, Settings};
 pub use report::{Incident, IncidentKind, StepReport};
 pub use view::{ContactView, ContactWith, Energy, RodView, ShapeView, View};
 pub use world::{World, Wrench};

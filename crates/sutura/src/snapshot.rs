@@ -4,11 +4,11 @@ use crate::error::Error;
 use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
-use crate::state::{GripState, LoadState, ShapeContact, State, ThreadContact};
+use crate::state::{GripState, LoadState, Onset, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version.
-const MAGIC: &[u8; 8] = b"sutura\x02\0";
+const MAGIC: &[u8; 8] = b"sutura\x03\0";
 
 /// Something that is written and read back without loss.
 trait Bytes: Sized {
@@ -164,6 +164,7 @@ macro_rules! variants {
     };
 }
 
+variants!(Onset { 0 => Unknown, 1 => Broken, 2 => Smooth });
 variants!(Hold { 0 => Pin, 1 => Clamp, 2 => Jaw });
 variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit } });
 variants!(Place { 0 => Start, 1 => End, 2 => Particle(i), 3 => Element(e), 4 => Arc(s) });
@@ -185,6 +186,9 @@ structure!(State {
     velocity,
     orientation,
     angular_velocity,
+    acceleration,
+    angular_acceleration,
+    onset,
     tension,
     plastic,
     hardened,

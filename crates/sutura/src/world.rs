@@ -10,7 +10,7 @@ use crate::model::{Model, ShapeModel};
 use crate::params::{Friction, Settings};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
-use crate::state::{GripState, LoadState, State};
+use crate::state::{GripState, LoadState, Onset, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
 
@@ -58,6 +58,7 @@ impl World {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
         settings.validate()?;
         self.model.settings = settings;
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
     /// Friction between two surfaces (indices given in `RodSpec::surface`, `ShapeSpec::surface`).
@@ -68,12 +69,14 @@ impl World {
             Ok(i) => self.model.friction[i].1 = friction,
             Err(i) => self.model.friction.insert(i, (key, friction)),
         }
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
 
     /// Adds a thread.
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
         let low = spec.lower()?;
+        self.state.interrupt(Onset::Unknown);
         let n = low.rest_lengths.len();
         let (model, state) = (&mut self.model, &mut self.state);
         let first = model.mass.len();
@@ -125,6 +128,7 @@ impl World {
     /// Removes a thread with its grips and loads.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
         let gone = self.model.rods.remove(rod).ok_or(ROD)?;
+        self.state.interrupt(Onset::Unknown);
         let range = gone.particles();
         let (model, state) = (&mut self.model, &mut self.state);
         macro_rules! drain {
@@ -192,6 +196,7 @@ impl World {
     /// Removes a shape.
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
         self.model.shapes.remove(shape).ok_or(SHAPE)?;
+        self.state.interrupt(Onset::Unknown);
         self.state.shape_contacts.retain(|c| c.shape != shape.index);
         Ok(())
     }
@@ -213,6 +218,7 @@ impl World {
     pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
         motion.validate()?;
         self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
+        self.state.interrupt(Onset::Unknown);
         self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
         Ok(())
     }
@@ -254,6 +260,7 @@ impl World {
             }
         };
         let pose = Pose::new(position, orientation);
+        self.state.interrupt(Onset::Unknown);
         Ok(self.state.grips.insert(GripState {
             rod: spec.rod.index,
             index,
@@ -275,7 +282,9 @@ impl World {
 
     /// Lets go.
     pub fn remove_grip(&mut self, grip: Handle<Grip>) -> Result<(), Error> {
-        self.state.grips.remove(grip).map(|_| ()).ok_or(GRIP)
+        self.state.grips.remove(grip).ok_or(GRIP)?;
+        self.state.interrupt(Onset::Unknown);
+        Ok(())
     }
 
     /// Pose wanted at the end of the next step for a pose-driven grip. A pin ignores the orientation. The orientation of a clamp or
@@ -298,6 +307,7 @@ impl World {
         let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
         g.drive = drive;
         g.target = g.pose;
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
 
@@ -325,6 +335,7 @@ impl World {
         let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
         self.validate_load(&spec.kind, rod)?;
         let handle = self.state.loads.insert(LoadState { rod: spec.rod.index, kind: spec.kind });
+        self.state.interrupt(Onset::Unknown);
         self.refresh_masses();
         Ok(handle)
     }
@@ -336,6 +347,7 @@ impl World {
         if let Some(l) = self.state.loads.get_mut(load) {
             l.kind = kind;
         }
+        self.state.interrupt(Onset::Unknown);
         self.refresh_masses();
         Ok(())
     }
@@ -343,6 +355,7 @@ impl World {
     /// Removes a load.
     pub fn remove_load(&mut self, load: Handle<Load>) -> Result<(), Error> {
         self.state.loads.remove(load).ok_or(LOAD)?;
+        self.state.interrupt(Onset::Unknown);
         self.refresh_masses();
         Ok(())
     }
@@ -521,10 +534,14 @@ impl World {
         if lengths.iter().any(|l| *l != n) {
             return Err("it is of a world with other threads");
         }
+        let known = if s.onset == Onset::Smooth { n } else { 0 };
+        if s.acceleration.len() != known || s.angular_acceleration.len() != known {
+            return Err("it has accelerations where there are none, or none where there are");
+        }
         if s.shape_pose.len() != self.model.shapes.len() || s.shape_target.len() != s.shape_pose.len() {
             return Err("it is of a world with other shapes");
         }
-        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.plastic);
+        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.acceleration).chain(&s.angular_acceleration).chain(&s.plastic);
         let finite = vectors.into_iter().all(|v| v.is_finite())
             && s.orientation.iter().all(|q| (q.length() - 1.0).abs() < 1e-6)
             && s.tension.iter().chain(&s.hardened).all(|v| v.is_finite())

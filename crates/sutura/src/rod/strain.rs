@@ -33,7 +33,16 @@ pub(crate) fn joint_angle(q0: DQuat, q1: DQuat, rest_half: DQuat) -> DVec3 {
     log((q0 * rest_half).conjugate() * (q1 * rest_half.conjugate()))
 }
 
-/// The same for two joints, with the derivatives.
+/// Rate of that angle while the two frames turn with angular velocities `w` \[rad/s\], world axes.
+pub(crate) fn joint_rate(q: [DQuat; 2], w: [DVec3; 2], rest_half: DQuat) -> DVec3 {
+    let j = joints([q[0]; 2], [q[1]; 2], [rest_half; 2]);
+    let (angle, c, squared) = (j.angle.split().0, j.c.to_array()[0], j.squared.to_array()[0]);
+    let across = w[1] - w[0];
+    let seen = DVec3::from(j.middle.map(|m| m.split().0.dot(across)));
+    seen * (1.0 + c * squared) - angle * (c * angle.dot(seen))
+}
+
+/// The angles of two joints, with the derivatives.
 #[inline(always)]
 pub(super) fn joints(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> Joints {
     let half = Quat2::load(rest_half[0], rest_half[1]);

@@ -35,6 +35,8 @@ struct Slider {
 pub(crate) struct Sliders {
     sliders: Vec<Slider>,
     count: usize,
+    /// Length of the solve \[s\].
+    h: f64,
     schur: Vec<f64>,
     dense: Vec<f64>,
     small: Vec<f64>,
@@ -42,8 +44,8 @@ pub(crate) struct Sliders {
 
 impl Sliders {
     /// Which shapes may slide. A pushed shape without force stays.
-    pub fn begin(&mut self, model: &Model) {
-        self.count = 0;
+    pub fn begin(&mut self, model: &Model, h: f64) {
+        (self.count, self.h) = (0, h);
         for (slot, shape) in model.shapes.iter() {
             if let ShapeMotion::Pushed { direction, force, .. } = shape.motion
                 && force > 0.0
@@ -63,7 +65,8 @@ impl Sliders {
     }
 
     /// Clears the border and puts the force law on the diagonal.
-    pub fn clear(&mut self, model: &Model, state: &State, start: &[crate::math::Pose], h: f64) {
+    pub fn clear(&mut self, model: &Model, state: &State, start: &[crate::math::Pose]) {
+        let h = self.h;
         for s in self.active() {
             let Some(ShapeMotion::Pushed { force, speed_limit, .. }) = model.shapes.at(s.shape).map(|s| s.motion) else { continue };
             let damper = force / (speed_limit * h);

@@ -115,7 +115,7 @@ impl ShapeRow {
 pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
     rows.shapes.clear();
-    rows.sliders.begin(model);
+    rows.sliders.begin(model, h);
     let old = &state.shape_contacts;
     let mut last = None;
     for (slot, e) in &candidates.shapes {
@@ -314,9 +314,9 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
 }
 
 /// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, first: bool) {
+pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
     let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
-    rows.sliders.clear(model, state, start_shape_pose, h);
+    rows.sliders.clear(model, state, start_shape_pose);
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in &mut rows.shapes {
         if !row.firm {

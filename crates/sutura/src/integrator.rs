@@ -1,0 +1,220 @@
+//! Time integration: what the solves of a substep start from, and the rates that they leave.
+//!
+//! Every solve is one of implicit Euler's form: inertia over `span` squared about the place `target` where the rates known so far lead,
+//!
+//! ```text
+//! x* = x_n + sum w_j v_j,   v* = v_n + sum w_j a_j,   target = x* + span v*,   a = (x - target) / span^2,   v = v* + span a
+//! ```
+//!
+//! over the rates at the start of the substep and at the end of its first solve. TR-BDF2 (Bank et al. 1985) has two solves of one span: the
+//! trapezoidal rule to the part 2 - sqrt 2 of the substep, then the backward difference formula over both parts. It is of second order, also in what is
+//! stiff (both of its solves end where the motion is), L-stable, and needs nothing of the substep before but accelerations. Where those are
+//! not known the method of Alexander (1977) takes a substep, with the same stability function. Theory 17.
+
+use crate::math::{exp, log};
+use crate::model::Model;
+use crate::params::Integrator;
+use crate::rod::strain;
+use crate::scratch::Scratch;
+use crate::state::{Onset, State};
+use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use glam::DVec3;
+
+/// How a substep is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// Implicit Euler: one solve.
+    Euler,
+    /// Two solves, the first with Euler's weights: needs no accelerations.
+    Alexander,
+    /// Two solves, the first by the trapezoidal rule.
+    TrBdf2,
+}
+
+/// One solve of a substep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Stage {
+    /// Where it begins and ends, from the start of the substep \[s\].
+    pub begin: f64,
+    pub end: f64,
+    /// Time by which its accelerations act on velocities \[s\].
+    pub span: f64,
+    /// Weights of the rates at the start of the substep and at the end of the first solve \[s\]; none in implicit Euler.
+    pub weights: Option<[f64; 2]>,
+    /// Part of the substep over which the accelerations that are known are continued to its end, for the first iterate; none where they are not known.
+    known: Option<f64>,
+    /// Whether it is the last one of the substep.
+    pub last: bool,
+}
+
+/// Span of a solve of the methods with two, over the substep: 1 - 1 / sqrt 2.
+const SPAN: f64 = 1.0 - FRAC_1_SQRT_2;
+
+impl Method {
+    /// The method for the next substep.
+    pub fn of(integrator: Integrator, onset: Onset) -> Method {
+        match (integrator, onset) {
+            (Integrator::ImplicitEuler, _) | (Integrator::TrBdf2, Onset::Broken) => Method::Euler,
+            (Integrator::TrBdf2, Onset::Unknown) => Method::Alexander,
+            (Integrator::TrBdf2, Onset::Smooth) => Method::TrBdf2,
+        }
+    }
+
+    /// The solves of a substep of length `h`, the only one twice.
+    pub fn stages(self, h: f64) -> [Stage; 2] {
+        let span = SPAN * h;
+        let two = |first: f64, weights: [[f64; 2]; 2], known: [Option<f64>; 2]| {
+            let [now, then] = weights.map(|w| Some(w.map(|x| x * h)));
+            [
+                Stage { begin: 0.0, end: first * h, span, weights: now, known: known[0], last: false },
+                Stage { begin: first * h, end: h, span, weights: then, known: known[1], last: true },
+            ]
+        };
+        match self {
+            Method::Euler => [Stage { begin: 0.0, end: h, span: h, weights: None, known: None, last: true }; 2],
+            Method::Alexander => two(SPAN, [[0.0, 0.0], [0.0, FRAC_1_SQRT_2]], [None, None]),
+            Method::TrBdf2 => two(2.0 * SPAN, [[SPAN, 0.0], [0.25 * SQRT_2; 2]], [Some(0.0), Some(0.5 / SPAN)]),
+        }
+    }
+}
+
+impl Stage {
+    /// Length of the solve \[s\].
+    pub fn length(&self) -> f64 {
+        self.end - self.begin
+    }
+}
+
+/// Sets up `target` and `target_frame`, and moves the state to the first iterate: for implicit Euler where its velocity carries it (loads left out:
+/// a light end under load would start far away), else on with the accelerations that are known. `origin` is the state at the start of the substep.
+pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, origin: &State, stage: &Stage, h: f64) {
+    let Some([w0, w1]) = stage.weights else {
+        carry_euler(model, state, scratch, h);
+        return;
+    };
+    let (keep, keep_spin) = half_damping(model, h);
+    let at_start = stage.begin == 0.0;
+    let span = stage.span;
+    // Acceleration for the first iterate.
+    let ahead = |known: &[DVec3], now: &[DVec3], i: usize| match stage.known {
+        None => DVec3::ZERO,
+        Some(_) if at_start => known[i],
+        Some(rate) => known[i] + (now[i] - known[i]) * rate,
+    };
+    let rate = |k: f64, w: f64, v: DVec3| if w == 0.0 { DVec3::ZERO } else { v * (k * w) };
+    let of = |known: &[DVec3], i: usize, w: f64| if w == 0.0 { DVec3::ZERO } else { known[i] * w };
+    for (rod, _) in &scratch.rods {
+        for i in rod.clone() {
+            let base = origin.position[i] + rate(keep, w0, origin.velocity[i]) + rate(1.0, w1, state.velocity[i]);
+            let carried = origin.velocity[i] * keep + of(&origin.acceleration, i, w0) + of(&state.acceleration, i, w1);
+            scratch.carried[i] = carried;
+            scratch.target[i] = base + carried * span;
+            state.position[i] = scratch.target[i] + ahead(&origin.acceleration, &state.acceleration, i) * (span * span);
+        }
+        for e in rod.start..rod.end - 1 {
+            // Angle over which damping takes its rate.
+            if e > rod.start && model.bend_damping[e] != 0.0 {
+                let half = model.rest_half[e];
+                let rate = |s: &State, w: f64, k: f64| {
+                    if w == 0.0 {
+                        DVec3::ZERO
+                    } else {
+                        strain::joint_rate([s.orientation[e - 1], s.orientation[e]], [s.angular_velocity[e - 1], s.angular_velocity[e]], half) * (w * k)
+                    }
+                };
+                scratch.start_angle[e] =
+                    strain::joint_angle(origin.orientation[e - 1], origin.orientation[e], half) + rate(origin, w0, keep_spin) + rate(state, w1, 1.0);
+            }
+        }
+        for e in rod.start..rod.end - 1 {
+            let base = exp(rate(1.0, w1, state.angular_velocity[e])) * (exp(rate(keep_spin, w0, origin.angular_velocity[e])) * origin.orientation[e]);
+            let carried = origin.angular_velocity[e] * keep_spin + of(&origin.angular_acceleration, e, w0) + of(&state.angular_acceleration, e, w1);
+            scratch.carried_spin[e] = carried;
+            scratch.target_frame[e] = (exp(carried * span) * base).normalize();
+            let on = ahead(&origin.angular_acceleration, &state.angular_acceleration, e) * (span * span);
+            state.orientation[e] = (exp(on) * scratch.target_frame[e]).normalize();
+        }
+    }
+}
+
+fn carry_euler(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
+    for (rod, _) in &scratch.rods {
+        for i in rod.clone() {
+            state.position[i] += state.velocity[i] * h;
+            scratch.target[i] = state.position[i];
+        }
+        for e in rod.start..rod.end - 1 {
+            // Only damping asks for it.
+            if e > rod.start && model.bend_damping[e] != 0.0 {
+                scratch.start_angle[e] = strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
+            }
+        }
+        for e in rod.start..rod.end - 1 {
+            let q = state.orientation[e];
+            let turned = exp(state.angular_velocity[e] * h);
+            state.orientation[e] = (turned * q).normalize();
+            scratch.target_frame[e] = state.orientation[e];
+        }
+    }
+}
+
+/// What half of a substep leaves of linear and angular velocities. Damping acts before and after the motion, half each, which is of second order.
+fn half_damping(model: &Model, h: f64) -> (f64, f64) {
+    let keep = |damping: f64| libm::pow(1.0 - damping, 0.5 * h);
+    (keep(model.settings.linear_damping), keep(model.settings.angular_damping))
+}
+
+/// Velocities from the motion, with damping, and the accelerations that go with them where the next substep may ask.
+pub(crate) fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, stage: &Stage, h: f64) {
+    if model.settings.integrator == Integrator::TrBdf2 {
+        let over = 1.0 / (stage.span * stage.span);
+        state.acceleration.resize(model.mass.len(), DVec3::ZERO);
+        state.angular_acceleration.resize(model.mass.len(), DVec3::ZERO);
+        for (rod, _) in &scratch.rods {
+            for i in rod.clone() {
+                state.acceleration[i] = (state.position[i] - scratch.target[i]) * over;
+            }
+            for e in rod.start..rod.end - 1 {
+                state.angular_acceleration[e] = log(state.orientation[e] * scratch.target_frame[e].conjugate()) * over;
+            }
+        }
+    }
+    if stage.weights.is_some() {
+        let (keep, keep_spin) = if stage.last { half_damping(model, h) } else { (1.0, 1.0) };
+        for (rod, _) in &scratch.rods {
+            for i in rod.clone() {
+                state.velocity[i] = (scratch.carried[i] + state.acceleration[i] * stage.span) * keep;
+            }
+            for e in rod.start..rod.end - 1 {
+                state.angular_velocity[e] = (scratch.carried_spin[e] + state.angular_acceleration[e] * stage.span) * keep_spin;
+            }
+        }
+        return;
+    }
+    let keep_linear = libm::pow(1.0 - model.settings.linear_damping, h);
+    let keep_angular = libm::pow(1.0 - model.settings.angular_damping, h);
+    for (rod, _) in &scratch.rods {
+        for i in rod.clone() {
+            state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
+        }
+        for e in rod.start..rod.end - 1 {
+            state.angular_velocity[e] = log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
+        }
+    }
+}
+
+/// Angular velocity of a frame as the motion takes it over at the start of the substep, and at the end of the last solve.
+pub(crate) fn spins(model: &Model, origin: &State, state: &State, h: f64, e: usize) -> [DVec3; 2] {
+    [origin.angular_velocity[e] * half_damping(model, h).1, state.angular_velocity[e]]
+}
+
+/// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round.
+pub(crate) fn touches_anew(before: &State, now: &State) -> bool {
+    fn threads(s: &State) -> impl Iterator<Item = (u32, u32, bool)> + '_ {
+        s.thread_contacts.iter().map(|c| (c.a, c.b, c.sliding))
+    }
+    fn shapes(s: &State) -> impl Iterator<Item = (u32, u32, bool)> + '_ {
+        s.shape_contacts.iter().map(|c| (c.shape, c.element, c.sliding))
+    }
+    !threads(before).eq(threads(now)) || !shapes(before).eq(shapes(now))
+}

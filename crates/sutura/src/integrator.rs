@@ -218,3 +218,48 @@ pub(crate) fn touches_anew(before: &State, now: &State) -> bool {
     }
     !threads(before).eq(threads(now)) || !shapes(before).eq(shapes(now))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Both solves of x' = k x over one substep, from x = 1 and its rate.
+    fn grown(method: Method, k: f64) -> f64 {
+        let (start, mut now) = ((1.0, k), (1.0, k));
+        for stage in method.stages(1.0) {
+            let [w0, w1] = stage.weights.unwrap();
+            let base = start.0 + w0 * start.1 + w1 * now.1;
+            let x = base / (1.0 - k * stage.span);
+            now = (x, (x - base) / stage.span);
+        }
+        now.0
+    }
+
+    #[test]
+    fn weights_make_methods_of_second_order_that_damp_what_is_stiff() {
+        for method in [Method::Alexander, Method::TrBdf2] {
+            for stage in method.stages(1.0) {
+                let [w0, w1] = stage.weights.unwrap();
+                assert!((w0 + w1 + stage.span - stage.end).abs() < 1e-15, "a constant rate is carried as far as it goes");
+            }
+            // exp(k) to second order, and the known constant of the third: 1/6 - 0.0404.
+            for k in [1e-2, -1e-2] {
+                let error = (grown(method, k) - f64::exp(k)) / (k * k * k);
+                assert!((error - 0.0404).abs() < 2e-3, "{method:?}: {error}");
+            }
+            assert!(grown(method, -1e9).abs() < 1e-8);
+        }
+        // A swing x'' = -w^2 x loses the part (w h)^4 / 272 a substep.
+        let w = 0.05_f64;
+        let (start, mut now) = (([1.0, 0.0], [0.0, -w * w]), ([1.0, 0.0], [0.0, -w * w]));
+        for stage in Method::TrBdf2.stages(1.0) {
+            let [w0, w1] = stage.weights.unwrap();
+            let [x, v] = [0, 1].map(|i| start.0[i] + w0 * start.1[i] + w1 * now.1[i]);
+            let a = -w * w * (x + stage.span * v) / (1.0 + w * w * stage.span * stage.span);
+            let new_v = v + stage.span * a;
+            now = ([x + stage.span * new_v, new_v], [new_v, a]);
+        }
+        let lost = 1.0 - (now.0[0].powi(2) + (now.0[1] / w).powi(2)).sqrt();
+        assert!((lost / w.powi(4) * 272.0 - 1.0).abs() < 0.02, "{}", lost / w.powi(4));
+    }
+}

@@ -122,6 +122,16 @@ mod tests {
     }
 
     #[test]
+    fn rate_matches_differences() {
+        let rest = exp(DVec3::new(0.1, 0.2, -0.15));
+        let q = [exp(DVec3::new(0.3, -0.7, 0.2)), exp(DVec3::new(0.5, 0.4, -0.3))];
+        let w = [DVec3::new(2.0, -1.0, 0.5), DVec3::new(-0.3, 1.5, 0.8)];
+        let at = |t: f64| joint_angle(exp(w[0] * t) * q[0], exp(w[1] * t) * q[1], rest);
+        let (got, want) = (joint_rate(q, w, rest), (at(1e-5) - at(-1e-5)) / 2e-5);
+        assert!((got - want).length() < 1e-8, "{got} {want}");
+    }
+
+    #[test]
     fn reversing_the_rod_mirrors_the_angle() {
         // Numbered from the other end, each frame is turned half a turn about d1: d2 and d3 change sign.
         let flip = exp(DVec3::X * core::f64::consts::PI);

@@ -54,7 +54,7 @@ fn advance(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &m
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     save(state, scratch, depth);
-    let mut method = Method::of(model.settings.integrator, state.onset);
+    let mut method = Method::of(model, state.onset, h);
     let mut attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
     if attempt.touches_anew {
         // What stops or jumps has no second derivative to go by, and would bounce.

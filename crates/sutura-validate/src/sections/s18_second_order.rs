@@ -45,7 +45,7 @@ fn cantilever() -> Study {
     Study::new("cantilever of 100 mm, mode 1", "vibrating")
         .set("solver.integrator", "tr_bdf2")
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
-        .set("phase.swing.duration", "4 s")
+        .set("phase.swing.duration", "8 s")
         .levels(SUBSTEPS.map(stepped).into())
         .quick(true)
         .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "tip")), vec![w / TAU], "chain of 20 links", Bar::Order(0.005, 1.8)))

@@ -47,7 +47,6 @@ fn cantilever() -> Study {
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
         .set("phase.swing.duration", "8 s")
         .levels(SUBSTEPS.map(stepped).into())
-        .quick(true)
         .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "tip")), vec![w / TAU], "chain of 20 links", Bar::Order(0.005, 1.8)))
         .quantity(Quantity::measured(
             "frequency [Hz]",

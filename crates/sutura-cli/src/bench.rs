@@ -6,7 +6,7 @@ use crate::{run, say, say_json, table};
 use anyhow::Context as _;
 use cpu_time::ThreadTime;
 use sutura::glam::DVec3;
-use sutura::{GripSpec, Hold, Material, Place, RodSpec, Settings, Stretch, World};
+use sutura::{GripSpec, Hold, Integrator, Material, Place, RodSpec, Settings, Shear, Stretch, World};
 use sutura_scene::Runner;
 
 /// Everything measured.
@@ -14,6 +14,7 @@ use sutura_scene::Runner;
 struct Measured {
     machine: Machine,
     free_thread: Vec<FreeThread>,
+    free_swing: Vec<FreeSwing>,
     knots: Vec<Knot>,
 }
 
@@ -41,6 +42,19 @@ struct FreeThread {
     incidents: usize,
 }
 
+/// How near a swing comes to its converged path, and what that costs.
+#[derive(serde::Serialize)]
+struct FreeSwing {
+    integrator: &'static str,
+    substeps_per_frame: u32,
+    newton_per_frame: f64,
+    ms_median: f64,
+    ms_p99: f64,
+    /// Root mean square distance of the end from the converged path, with drag over 2 s and without over half a second \[mm\].
+    drag_rms_mm: f64,
+    free_rms_mm: f64,
+}
+
 #[derive(serde::Serialize)]
 struct Knot {
     scene: String,
@@ -63,13 +77,14 @@ const RADIUS: f64 = 1e-4;
 pub fn bench(args: &Bench) -> anyhow::Result<()> {
     let counts = if args.elements.is_empty() { vec![40, 120, 500, 2000] } else { args.elements.clone() };
     let shapes = args.shape.map_or_else(|| vec![FreeShape::Straight, FreeShape::Helix], |s| vec![s]);
-    let mut measured = Measured { machine: machine(), free_thread: Vec::new(), knots: Vec::new() };
+    let mut measured = Measured { machine: machine(), free_thread: Vec::new(), free_swing: Vec::new(), knots: Vec::new() };
     if !args.knots {
         for shape in shapes {
             for &n in &counts {
                 measured.free_thread.push(free_thread(shape, n, args.frames)?);
             }
         }
+        measured.free_swing = free_swings()?;
     }
     if !args.free {
         let rod_ns = measured.free_thread.iter().map(|f| f.ns_per_element_iteration).reduce(f64::min);
@@ -118,6 +133,64 @@ fn free_thread(shape: FreeShape, elements: u32, frames: u32) -> anyhow::Result<F
         max_elongation: elongation,
         incidents,
     })
+}
+
+/// Frames of a swing with drag, and of one without: after half a second that one is chaotic.
+const SWINGS: [(f64, usize); 2] = [(4.0, 120), (0.0, 30)];
+
+fn free_swings() -> anyhow::Result<Vec<FreeSwing>> {
+    let converged = SWINGS.map(|(drag, frames)| swing(Integrator::TrBdf2, 64, 1e-5, drag, frames));
+    let mut out = Vec::new();
+    for (integrator, name, counts) in [(Integrator::ImplicitEuler, "implicit Euler", [4, 8, 16]), (Integrator::TrBdf2, "TR-BDF2", [2, 4, 6])] {
+        for substeps in counts {
+            let [drag, free] = SWINGS.map(|(drag, frames)| swing(integrator, substeps, Settings::default().tolerance, drag, frames));
+            let (mut drag, free) = (drag?, free?);
+            let [with, without] = converged.each_ref().map(|c| c.as_ref().map_or(&[][..], |c| &c.path));
+            out.push(FreeSwing {
+                integrator: name,
+                substeps_per_frame: substeps,
+                newton_per_frame: drag.newton as f64 / drag.path.len() as f64,
+                ms_median: quantile(&mut drag.ms, 0.5),
+                ms_p99: quantile(&mut drag.ms, 0.99),
+                drag_rms_mm: 1e3 * apart(&drag.path, with),
+                free_rms_mm: 1e3 * apart(&free.path, without),
+            });
+        }
+    }
+    Ok(out)
+}
+
+struct Swing {
+    path: Vec<DVec3>,
+    ms: Vec<f64>,
+    newton: u64,
+}
+
+/// The path of the free end of a thread of 15 cm, radius 0.25 mm, E = 10 MPa, clamped and let go level, frame by frame.
+fn swing(integrator: Integrator, substeps: u32, tolerance: f64, drag: f64, frames: usize) -> anyhow::Result<Swing> {
+    const ELEMENTS: usize = 120;
+    let linear_damping = -(-drag).exp_m1();
+    let mut world = World::new(Settings { substep: FRAME / f64::from(substeps), integrator, tolerance, linear_damping, ..Settings::default() })?;
+    let material = Material { shear: Shear::Modulus(1e7 / 3.0), ..Material::elastic(1e7, 1000.0) };
+    let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * LENGTH, ELEMENTS, 0.25e-3, material))?;
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp))?;
+    let mut swing = Swing { path: Vec::new(), ms: Vec::new(), newton: 0 };
+    for _ in 0..frames {
+        let start = ThreadTime::now();
+        let report = world.step(FRAME);
+        swing.ms.push(1e3 * start.elapsed().as_secs_f64());
+        swing.newton += u64::from(report.newton_iterations);
+        swing.path.push(world.rod(rod)?.positions()[ELEMENTS]);
+    }
+    Ok(swing)
+}
+
+/// Root mean square distance; not a number where there is nothing to compare with.
+fn apart(a: &[DVec3], b: &[DVec3]) -> f64 {
+    if a.len() != b.len() {
+        return f64::NAN;
+    }
+    (a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
 fn knot(name: &str, rod_ns: Option<f64>) -> anyhow::Result<Knot> {
@@ -192,6 +265,26 @@ fn as_tables(m: &Measured) -> String {
             ]);
         }
         out.push_str(&format!("\n{:.0} cm, radius {} mm, one end pinned, dropped, 60 frames/s\n{t}\n", 100.0 * LENGTH, 1e3 * RADIUS));
+    }
+    if !m.free_swing.is_empty() {
+        let mut t = table(
+            &["free swing", "substeps/frame", "Newton/frame", "ms/frame median", "p99", "off [mm], drag 4/s, 2 s", "off [mm], no drag, 0.5 s"],
+            &[1, 2, 3, 4, 5, 6],
+        );
+        for f in &m.free_swing {
+            t.add_row([
+                f.integrator.to_string(),
+                f.substeps_per_frame.to_string(),
+                format!("{:.1}", f.newton_per_frame),
+                format!("{:.4}", f.ms_median),
+                format!("{:.4}", f.ms_p99),
+                format!("{:.3}", f.drag_rms_mm),
+                format!("{:.3}", f.free_rms_mm),
+            ]);
+        }
+        out.push_str(&format!(
+            "\n15 cm, radius 0.25 mm, 120 elements, E 10 MPa, clamped, let go level; times with drag; RMS of the end from its converged path\n{t}\n"
+        ));
     }
     if !m.knots.is_empty() {
         let mut t = table(

@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3, EulerRot};
 use sutura::math::{exp, frame_from_tangent, log};
 use sutura::{
-    Along, Closure, Friction, Geometry, Hold, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion,
-    ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
+    Along, Closure, Friction, Geometry, Hold, Integrator, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings,
+    ShapeMotion, ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
 };
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
@@ -369,6 +369,10 @@ impl<'d> Loader<'d> {
         self.solver_numbers(&table, &mut settings);
         if let Some(n) = table.get("halvings").and_then(|v| v.integer(0, 12)) {
             settings.halvings = n as u32;
+        }
+        let integrators = [("implicit_euler", Integrator::ImplicitEuler), ("tr_bdf2", Integrator::TrBdf2)];
+        if let Some(integrator) = table.get("integrator").and_then(|v| v.choice(&integrators)) {
+            settings.integrator = integrator;
         }
         let location = table.location();
         table.finish();

@@ -89,9 +89,14 @@ fn outcome(study: &Study, level: &Level) -> Result<Outcome, String> {
     if study.scene.is_empty() {
         return Ok(Outcome::default());
     }
-    let text = scene_text(study.scene).ok_or_else(|| format!("there is no scene `{}`", study.scene))?;
     let settings: Vec<(String, String)> = study.settings.iter().chain(&level.settings).cloned().collect();
-    let scene = Scene::parse_with(text, &format!("{}.toml", study.scene), &settings).map_err(|e| e.to_string())?;
+    scene(study.scene, &settings)
+}
+
+/// Runs a scene of `scenes/validation/` with values set in it.
+pub(crate) fn scene(name: &str, settings: &[(String, String)]) -> Result<Outcome, String> {
+    let text = scene_text(name).ok_or_else(|| format!("there is no scene `{name}`"))?;
+    let scene = Scene::parse_with(text, &format!("{name}.toml"), settings).map_err(|e| e.to_string())?;
     let mut runner = Runner::new(scene).map_err(|e| e.to_string())?;
     while !runner.step_frame().finished {}
     Ok(runner.finish())

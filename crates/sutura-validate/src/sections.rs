@@ -15,6 +15,7 @@ mod s12_knots;
 mod s13_identities;
 mod s14_friction;
 mod s17_frames;
+mod s18_second_order;
 
 use crate::study::Section;
 
@@ -39,6 +40,7 @@ pub fn sections() -> Vec<Section> {
         s13_identities::section(),
         s14_friction::section(),
         s17_frames::section(),
+        s18_second_order::section(),
     ]
 }
 

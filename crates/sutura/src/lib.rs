@@ -7,6 +7,7 @@ pub mod audit;
 mod collide;
 pub mod error;
 pub mod handle;
+mod integrator;
 #[doc(hidden)]
 pub mod kernels;
 pub mod knot;
@@ -36,7 +37,7 @@ pub use model::rod::{Closure, RestShape, Rod, RodSpec, Stretch, transported_fram
 pub use model::section::{Along, Profile, Section};
 pub use model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
 pub use model::weld::{Weld, WeldRest, WeldSpec};
-pub use params::{Friction, Settings};
+pub use params::{Friction, Integrator, Settings};
 pub use report::{Incident, IncidentKind, StepReport};
 pub use view::{ContactView, ContactWith, Energy, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

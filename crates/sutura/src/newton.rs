@@ -48,7 +48,8 @@ pub(crate) struct Outcome {
     pub residual: f64,
 }
 
-/// Solves the substep of length `h` from `scratch.start`, carried on to `scratch.target` by its velocity; the iterate is in `state`.
+/// Solves for the end of a motion from `scratch.start`, carried on to `scratch.target` by its velocity; accelerations act over `h`, which in implicit
+/// Euler is the substep. The iterate is in `state`.
 pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) -> Outcome {
     let settings = &model.settings;
     carried_forces(model, state, scratch);
@@ -185,9 +186,9 @@ fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 pub(crate) fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
     assemble(model, state, scratch, h, hessian);
     brake::assemble(model, state, scratch);
-    row::shape::assemble(model, state, scratch, h, first);
+    row::shape::assemble(model, state, scratch, first);
     let Scratch { rows, rhs, system, .. } = &mut *scratch;
-    rows.welds.assemble_joints(state, rhs, &mut system.diagonal, h);
+    rows.welds.assemble_joints(state, rhs, &mut system.diagonal);
     row::weld::gather(model, state, scratch, hessian == Hessian::Exact);
     restrict(state, scratch);
     let Scratch { system, rods, rows, freedom, .. } = scratch;
@@ -205,8 +206,8 @@ fn restrict(state: &State, scratch: &mut Scratch) {
         if freedom == Freedom::Free {
             continue;
         }
-        if let Freedom::Line { direction, force, damper } = freedom {
-            let moved = direction.dot(state.position[node / 2] - scratch.start[node / 2]);
+        if let Freedom::Line { direction, force, damper, from } = freedom {
+            let moved = direction.dot(state.position[node / 2] - from);
             scratch.system.diagonal[node] += outer(direction, direction) * damper;
             scratch.rhs[node] += direction * (force - damper * moved);
         }
@@ -233,10 +234,10 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
             }
         }
     }
-    assemble_clamps(state, scratch, h);
+    assemble_clamps(state, scratch);
     let Scratch { rows, rhs, system, .. } = &mut *scratch;
-    rows.welds.assemble_joints(state, rhs, &mut system.diagonal, h);
-    row::shape::assemble(model, state, scratch, h, false);
+    rows.welds.assemble_joints(state, rhs, &mut system.diagonal);
+    row::shape::assemble(model, state, scratch, false);
     row::couple::add_forces(scratch);
 }
 

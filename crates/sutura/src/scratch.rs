@@ -15,10 +15,12 @@ pub(crate) enum Freedom {
     Free,
     Held,
     /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the substep, \[N/m\]).
+    /// Its move is counted from `from`.
     Line {
         direction: DVec3,
         force: f64,
         damper: f64,
+        from: DVec3,
     },
 }
 
@@ -43,8 +45,9 @@ pub(crate) struct ClampJoint {
     pub orientation: DQuat,
     pub rest_half: DQuat,
     pub stiffness: DVec3,
+    /// Damping time over the span of the solve.
     pub damping: f64,
-    /// Angle at the start of the substep.
+    /// Angle over which damping takes its rate: in implicit Euler that at the start of the substep.
     pub start: DVec3,
 }
 
@@ -56,6 +59,9 @@ pub(crate) struct Scratch {
     /// Where the velocity alone would carry positions and orientations.
     pub target: Vec<DVec3>,
     pub target_frame: Vec<DQuat>,
+    /// Velocity and angular velocity there; not set by implicit Euler.
+    pub carried: Vec<DVec3>,
+    pub carried_spin: Vec<DVec3>,
     /// Start of the substep.
     pub start: Vec<DVec3>,
     pub start_frame: Vec<DQuat>,
@@ -99,6 +105,8 @@ impl Scratch {
         let n = model.mass.len();
         self.target.resize(n, DVec3::ZERO);
         self.target_frame.resize(n, DQuat::IDENTITY);
+        self.carried.resize(n, DVec3::ZERO);
+        self.carried_spin.resize(n, DVec3::ZERO);
         self.start.resize(n, DVec3::ZERO);
         self.start_frame.resize(n, DQuat::IDENTITY);
         self.start_angle.resize(n, DVec3::ZERO);

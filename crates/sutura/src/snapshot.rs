@@ -5,7 +5,7 @@ use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
 use crate::model::reel::ReelLaw;
-use crate::state::{GripState, LoadState, ReelState, ShapeContact, State, ThreadContact};
+use crate::state::{GripState, LoadState, Onset, ReelState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version.
@@ -166,6 +166,7 @@ macro_rules! variants {
 }
 
 variants!(ReelLaw { 0 => Rate(rate), 1 => Brake(force) });
+variants!(Onset { 0 => Unknown, 1 => Broken, 2 => Smooth });
 variants!(Hold { 0 => Pin, 1 => Clamp, 2 => Jaw });
 variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit } });
 variants!(Place { 0 => Start, 1 => End, 2 => Particle(i), 3 => Element(e), 4 => Arc(s) });
@@ -189,6 +190,9 @@ structure!(State {
     velocity,
     orientation,
     angular_velocity,
+    acceleration,
+    angular_acceleration,
+    onset,
     tension,
     plastic,
     hardened,

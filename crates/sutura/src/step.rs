@@ -1,16 +1,19 @@
 //! The step. Stage order is decided here and nowhere else.
 
-use crate::collide;
+use crate::collide::{self, Clearance};
+use crate::integrator::{self, Method, Stage, touches_anew};
 use crate::math::{Pose, exp, log};
 use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind};
 use crate::model::shape::ShapeMotion;
 use crate::newton;
+use crate::params::Integrator;
 use crate::reel;
 use crate::report::{Incident, IncidentKind, StepReport};
+use crate::rod::strain;
 use crate::row;
 use crate::scratch::{ClampJoint, Freedom, Scratch};
-use crate::state::{GripState, State};
+use crate::state::{GripState, Onset, State};
 use crate::view::View;
 use glam::{DQuat, DVec3};
 
@@ -33,6 +36,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
             scratch.fit(model);
+            state.interrupt(Onset::Unknown);
         }
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
@@ -69,31 +73,30 @@ fn advance(
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     save(state, scratch, depth);
-    if reel::turn(model, state, h) {
+    let reels = reel::turn(model, state, h);
+    if reels {
         outside_forces(model, state, scratch);
     }
-    predict(model, state, scratch, interval, t + h, h);
-    collide::detect(model, state, scratch);
-    row::thread::begin(model, state, scratch);
-    row::shape::begin(model, state, scratch, h);
-    let outcome = newton::solve(model, state, scratch, h);
-    report.newton_iterations += outcome.iterations;
-    let verdict = if !outcome.finite {
-        Err(NOT_FINITE)
-    } else if !outcome.converged && depth < model.settings.halvings {
-        Err("not converged")
-    } else {
-        collide::sweep(model, state, scratch)
-    };
-    let last = state.last_h;
-    let verdict = verdict.and_then(|clearance| {
-        reel::pay_out(model, state, &scratch.brakes);
-        accept(model, state, scratch, h);
-        let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
-        if clear && all_finite(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
-    });
+    // Length that comes in has no past to go by.
+    let mut method = if reels { Method::Euler } else { Method::of(model, state.onset, h) };
+    let mut attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
+    if attempt.touches_anew {
+        // What stops or jumps has no second derivative to go by, and would bounce.
+        restore(state, scratch, depth);
+        method = Method::Euler;
+        attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
+    }
+    let Attempt { outcome, verdict, .. } = attempt;
     match verdict {
         Ok(clearance) => {
+            if model.settings.integrator == Integrator::TrBdf2 {
+                if reels || method == Method::Euler && touches_anew(&scratch.saved[depth as usize], state) {
+                    state.interrupt(Onset::Broken);
+                } else {
+                    state.onset = Onset::Smooth;
+                }
+            }
+            let last = state.last_h;
             state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
             state.time = t + h;
@@ -125,6 +128,7 @@ fn advance(
             // Rest: what moved into this state must not push again.
             state.velocity.fill(DVec3::ZERO);
             state.angular_velocity.fill(DVec3::ZERO);
+            state.interrupt(Onset::Unknown);
             false
         }
     }
@@ -140,6 +144,68 @@ fn all_finite(model: &Model, state: &State) -> bool {
         arm.cross(c.normal * c.normal_force + c.friction).is_finite()
     });
     grips && shapes && threads && on_shapes && crate::rod::in_proportion(model, state)
+}
+
+/// What a substep came to.
+struct Attempt {
+    outcome: newton::Outcome,
+    verdict: Result<Clearance, &'static str>,
+    /// Whether it was of second order although contacts changed in it.
+    touches_anew: bool,
+}
+
+/// The solves of a substep of length `h` from `t`, each looked at and accepted by itself.
+#[allow(clippy::too_many_arguments, reason = "those of `advance`")]
+fn solve(
+    model: &mut Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &Interval<'_>,
+    t: f64,
+    h: f64,
+    depth: u32,
+    method: Method,
+    report: &mut StepReport,
+) -> Attempt {
+    let mut attempt: Option<Attempt> = None;
+    for stage in method.stages(h) {
+        predict(model, state, scratch, interval, t, &stage, h, depth);
+        collide::detect(model, state, scratch);
+        row::thread::begin(model, state, scratch);
+        row::shape::begin(model, state, scratch, stage.length());
+        let outcome = newton::solve(model, state, scratch, stage.span);
+        report.newton_iterations += outcome.iterations;
+        let verdict = if !outcome.finite {
+            Err(NOT_FINITE)
+        } else if !outcome.converged && depth < model.settings.halvings {
+            Err("not converged")
+        } else {
+            collide::sweep(model, state, scratch)
+        };
+        let mut touches = false;
+        let verdict = verdict.and_then(|clearance| {
+            reel::pay_out(model, state, &scratch.brakes);
+            accept(model, state, scratch, &stage, h);
+            let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
+            if clear && all_finite(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
+        });
+        if verdict.is_ok() {
+            touches = method != Method::Euler && touches_anew(&scratch.saved[depth as usize], state);
+        }
+        let so_far = match (attempt, verdict) {
+            (Some(Attempt { outcome: before, verdict: Ok(c), .. }), Ok(d)) => Attempt {
+                outcome: newton::Outcome { converged: outcome.converged && before.converged, residual: outcome.residual.max(before.residual), ..outcome },
+                verdict: Ok(Clearance { thread: least(c.thread, d.thread), shape: least(c.shape, d.shape) }),
+                touches_anew: touches,
+            },
+            (_, verdict) => Attempt { outcome, verdict, touches_anew: touches },
+        };
+        if stage.last || touches || so_far.verdict.is_err() {
+            return so_far;
+        }
+        attempt = Some(so_far);
+    }
+    unreachable!("a method has a last solve")
 }
 
 fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
@@ -206,35 +272,21 @@ fn smoothstep(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Moves the state to the iterate that Newton starts from, where its velocity carries it (loads left out: a light end under load would
-/// start far away), and places what is held.
-fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, t: f64, h: f64) {
+/// Moves the state to the iterate that Newton starts from, and places what is held. `began` is when the substep did.
+#[allow(clippy::too_many_arguments, reason = "those of `solve`")]
+fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, began: f64, stage: &Stage, h: f64, depth: u32) {
     scratch.start.copy_from_slice(&state.position);
     scratch.start_frame.copy_from_slice(&state.orientation);
     scratch.start_shape_pose.clone_from(&state.shape_pose);
     scratch.freedom.fill(Freedom::Free);
     scratch.joint_on.fill(true);
     scratch.clamps.clear();
-    scratch.rows.welds.begin(model, state, &mut scratch.joint_on);
+    scratch.rows.welds.begin(model, state, &mut scratch.joint_on, stage.length());
     crate::rod::brake::begin(model, state, &mut scratch.brakes);
-    for (rod, _) in &scratch.rods {
-        for i in rod.clone() {
-            state.position[i] += state.velocity[i] * h;
-            scratch.target[i] = state.position[i];
-        }
-        for e in rod.start..rod.end - 1 {
-            // Only damping asks for it.
-            if e > rod.start && model.bend_damping[e] != 0.0 {
-                scratch.start_angle[e] = crate::rod::strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
-            }
-        }
-        for e in rod.start..rod.end - 1 {
-            let q = state.orientation[e];
-            let turned = exp(state.angular_velocity[e] * h);
-            state.orientation[e] = (turned * q).normalize();
-            scratch.target_frame[e] = state.orientation[e];
-        }
-    }
+    let saved = core::mem::take(&mut scratch.saved);
+    let origin = &saved[depth as usize];
+    integrator::carry(model, state, scratch, origin, stage, h);
+    let t = began + stage.end;
     for (slot, grip) in state.grips.iter() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
         let first = rod.first as usize;
@@ -245,7 +297,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             Drive::Force { direction, force, speed_limit } => {
                 let u = if grip.ramp > 0.0 { ((t - grip.taken_at) / grip.ramp).clamp(0.0, 1.0) } else { 1.0 };
                 let force = force * smoothstep(u);
-                (Some((direction, force, force / speed_limit / h)), if grip.hold == Hold::Jaw { 0.5 } else { 1.0 })
+                (Some((direction, force, force / speed_limit / stage.span)), if grip.hold == Hold::Jaw { 0.5 } else { 1.0 })
             }
         };
         let mut place = |i: usize, position: DVec3| match line {
@@ -254,7 +306,8 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                 state.position[i] = position;
             }
             Some((direction, force, damper)) if force > 0.0 => {
-                scratch.freedom[2 * i] = Freedom::Line { direction, force: force * count, damper: damper * count };
+                let from = if stage.weights.is_some() { scratch.target[i] - scratch.carried[i] * stage.span } else { scratch.start[i] };
+                scratch.freedom[2 * i] = Freedom::Line { direction, force: force * count, damper: damper * count, from };
                 let along = direction * direction.dot(state.position[i] - scratch.start[i]);
                 state.position[i] = scratch.start[i] + along;
             }
@@ -279,14 +332,21 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                 let stiffness = |e: usize| model.section[e].bend / (0.5 * model.rest_length[e]);
                 let sides = [(i > first).then(|| (i - 1, false)), (i < first + rod.n_elements as usize).then_some((i, true))];
                 for (e, before) in sides.into_iter().flatten() {
-                    let q = scratch.start_frame[e];
-                    // Damping acts against the clamp's own orientation at the start of the substep.
-                    let held = grip_pose(grip, interval, t - h).orientation;
-                    let start = if before {
-                        crate::rod::strain::joint_angle(held, q, grip.rest_half)
-                    } else {
-                        crate::rod::strain::joint_angle(q, held, grip.rest_half)
-                    };
+                    // Damping acts against the clamp's own orientation.
+                    let held = |t: f64| grip_pose(grip, interval, t).orientation;
+                    let pair = |held: DQuat, q: DQuat| if before { [held, q] } else { [q, held] };
+                    let angle = |[a, b]: [DQuat; 2]| strain::joint_angle(a, b, grip.rest_half);
+                    let now = pair(held(t - stage.length()), scratch.start_frame[e]);
+                    let start = stage.weights.map_or_else(
+                        || angle(now),
+                        |weights| {
+                            let at_start = pair(held(began), origin.orientation[e]);
+                            let turning = log(pose.orientation * held(began).conjugate()) / stage.end;
+                            let rate = |at: [DQuat; 2], w: DVec3| strain::joint_rate(at, if before { [turning, w] } else { [w, turning] }, grip.rest_half);
+                            let [w0, w1] = integrator::spins(model, origin, state, h, e);
+                            angle(at_start) + rate(at_start, w0) * weights[0] + rate(now, w1) * weights[1]
+                        },
+                    );
                     scratch.clamps.push(ClampJoint {
                         grip: slot,
                         frame: e as u32,
@@ -294,7 +354,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                         orientation: pose.orientation,
                         rest_half: grip.rest_half,
                         stiffness: stiffness(e),
-                        damping: rod.material.bend_damping,
+                        damping: rod.material.bend_damping / stage.span,
                         start,
                     });
                 }
@@ -306,31 +366,28 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                 scratch.freedom[2 * i + 1] = Freedom::Held;
                 state.orientation[i] = pose.orientation;
                 scratch.target_frame[i] = pose.orientation;
+                scratch.carried_spin[i] = log(pose.orientation * scratch.start_frame[i].conjugate()) / stage.length();
             }
         }
     }
-    scratch.rows.welds.predict(model, state, &mut scratch.freedom, h);
+    scratch.rows.welds.predict(model, state, &mut scratch.freedom, stage.length());
     for (slot, shape) in model.shapes.iter() {
         let k = slot as usize;
         if matches!(shape.motion, ShapeMotion::Driven) {
             // Rate that reaches the target at the end of the interval; equal to interpolating from its start.
-            let left = interval.start + interval.length - (t - h);
-            let s = if left > h { h / left } else { 1.0 };
+            let left = interval.start + interval.length - (t - stage.length());
+            let s = if left > stage.length() { stage.length() / left } else { 1.0 };
             state.shape_pose[k] = state.shape_pose[k].interpolate(&state.shape_target[k], s);
         }
     }
+    scratch.saved = saved;
 }
 
 /// Velocities from the motion, damping, plastic flow, and what the next substep starts from.
-fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
-    let keep_linear = libm::pow(1.0 - model.settings.linear_damping, h);
-    let keep_angular = libm::pow(1.0 - model.settings.angular_damping, h);
+fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, stage: &Stage, h: f64) {
+    integrator::leave_rates(model, state, scratch, stage, h);
     for (rod, _) in &scratch.rods {
-        for i in rod.clone() {
-            state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
-        }
         for e in rod.start..rod.end - 1 {
-            state.angular_velocity[e] = log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
             let strain = crate::rod::element_strain(model, state, e);
             state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
         }
@@ -338,7 +395,7 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
     yield_plastic(model, state);
     row::thread::finish(state, scratch);
     row::shape::finish(model, state, scratch);
-    reactions(model, state, scratch, h);
+    reactions(model, state, scratch, stage.span);
 }
 
 /// Bend and twist beyond yield become permanent (return mapping with isotropic hardening, bending radially in the two directions).
@@ -388,7 +445,7 @@ fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
             Hold::Clamp if let Some(weld) = model.weld_of[i] => grip.torque = -scratch.rows.welds.moment(weld),
             Hold::Clamp => {
                 for c in scratch.clamps.iter().filter(|c| c.grip == slot) {
-                    let (moment, _) = crate::rod::assemble::clamp_terms(c, state.orientation[c.frame as usize], h);
+                    let (moment, _) = crate::rod::assemble::clamp_terms(c, state.orientation[c.frame as usize]);
                     grip.torque += if c.first { -moment } else { moment };
                 }
             }

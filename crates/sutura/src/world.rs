@@ -13,7 +13,7 @@ use crate::params::{Friction, Settings};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::Scratch;
-use crate::state::{GripState, LoadState, ReelState, State};
+use crate::state::{GripState, LoadState, Onset, ReelState, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
 
@@ -59,6 +59,7 @@ impl World {
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
         settings.validate()?;
         self.model.settings = settings;
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
     /// Friction between two surfaces (indices given in `RodSpec::surface`, `ShapeSpec::surface`).
@@ -69,12 +70,14 @@ impl World {
             Ok(i) => self.model.friction[i].1 = friction,
             Err(i) => self.model.friction.insert(i, (key, friction)),
         }
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
 
     /// Adds a thread.
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
         let low = spec.lower()?;
+        self.state.interrupt(Onset::Unknown);
         let n = low.rest_lengths.len();
         let (model, state) = (&mut self.model, &mut self.state);
         let first = model.mass.len();
@@ -136,6 +139,7 @@ impl World {
     /// Removes a thread with its grips and loads. What it was welded to comes apart where fewer than two threads are left.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
         let gone = self.model.rods.remove(rod).ok_or(ROD)?;
+        self.state.interrupt(Onset::Unknown);
         let range = gone.particles();
         let (model, state) = (&mut self.model, &mut self.state);
         macro_rules! drain {
@@ -262,6 +266,7 @@ impl World {
     /// Takes a weld apart. A thread that went through it goes on, ends are free.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
         self.model.welds.remove(weld).ok_or(WELD)?;
+        self.state.interrupt(Onset::Unknown);
         self.model.refresh_welds();
         Ok(())
     }
@@ -274,6 +279,7 @@ impl World {
     }
 
     fn join(&mut self, members: Vec<Member>, orientation: DQuat) -> Handle<Weld> {
+        self.state.interrupt(Onset::Unknown);
         let radius = members.iter().map(|m| self.radius_of(m.index(&self.model))).fold(0.0, f64::max);
         let mut weld = WeldModel { members, exempt: core::f64::consts::PI * radius };
         weld.exempt = crate::collide::exempt(&self.model, &self.state.position, &weld);
@@ -306,6 +312,7 @@ impl World {
     /// Removes a shape.
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
         self.model.shapes.remove(shape).ok_or(SHAPE)?;
+        self.state.interrupt(Onset::Unknown);
         self.state.shape_contacts.retain(|c| c.shape != shape.index);
         Ok(())
     }
@@ -327,6 +334,7 @@ impl World {
     pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
         motion.validate()?;
         self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
+        self.state.interrupt(Onset::Unknown);
         self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
         Ok(())
     }
@@ -375,6 +383,7 @@ impl World {
             }
         };
         let pose = Pose::new(position, orientation);
+        self.state.interrupt(Onset::Unknown);
         Ok(self.state.grips.insert(GripState {
             rod: spec.rod.index,
             index,
@@ -396,7 +405,9 @@ impl World {
 
     /// Lets go.
     pub fn remove_grip(&mut self, grip: Handle<Grip>) -> Result<(), Error> {
-        self.state.grips.remove(grip).map(|_| ()).ok_or(GRIP)
+        self.state.grips.remove(grip).ok_or(GRIP)?;
+        self.state.interrupt(Onset::Unknown);
+        Ok(())
     }
 
     /// Pose wanted at the end of the next step for a pose-driven grip. A pin ignores the orientation. The orientation of a clamp or
@@ -419,6 +430,7 @@ impl World {
         let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
         g.drive = drive;
         g.target = g.pose;
+        self.state.interrupt(Onset::Unknown);
         Ok(())
     }
 
@@ -446,6 +458,7 @@ impl World {
         let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
         self.validate_load(&spec.kind, rod)?;
         let handle = self.state.loads.insert(LoadState { rod: spec.rod.index, kind: spec.kind });
+        self.state.interrupt(Onset::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(handle)
     }
@@ -457,6 +470,7 @@ impl World {
         if let Some(l) = self.state.loads.get_mut(load) {
             l.kind = kind;
         }
+        self.state.interrupt(Onset::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
@@ -464,6 +478,7 @@ impl World {
     /// Removes a load.
     pub fn remove_load(&mut self, load: Handle<Load>) -> Result<(), Error> {
         self.state.loads.remove(load).ok_or(LOAD)?;
+        self.state.interrupt(Onset::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
@@ -490,6 +505,7 @@ impl World {
             return Err(Error::invalid("reel", "at_end", spec.at_end, "an end whose last element no jaw holds"));
         }
         let length = model.rest_length[e];
+        self.state.interrupt(Onset::Unknown);
         let reel = ReelState { rod: spec.rod.index, at_end: spec.at_end, law: spec.law, supply: spec.supply, nominal: length, length, fed: 0.0, added: 0 };
         Ok(self.state.reels.insert(reel))
     }
@@ -693,10 +709,14 @@ impl World {
         if s.weld_orientation.len() != self.model.welds.len() {
             return Err("it is of a world with other welds");
         }
+        let known = if s.onset == Onset::Smooth { n } else { 0 };
+        if s.acceleration.len() != known || s.angular_acceleration.len() != known {
+            return Err("it has accelerations where there are none, or none where there are");
+        }
         if s.shape_pose.len() != self.model.shapes.len() || s.shape_target.len() != s.shape_pose.len() {
             return Err("it is of a world with other shapes");
         }
-        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.plastic);
+        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.acceleration).chain(&s.angular_acceleration).chain(&s.plastic);
         let finite = vectors.into_iter().all(|v| v.is_finite())
             && s.orientation.iter().chain(&s.weld_orientation).all(|q| (q.length() - 1.0).abs() < 1e-6)
             && s.tension.iter().chain(&s.hardened).all(|v| v.is_finite())

@@ -7,7 +7,9 @@ mod support;
 
 use support::{overhand, quiet, t1};
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Drive, Friction, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch, World};
+use sutura::{
+    Drive, Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch, World,
+};
 
 const DT: f64 = 1.0 / 60.0;
 
@@ -58,9 +60,11 @@ fn the_counter_sees_an_allocation() {
 #[test]
 fn a_swinging_thread() {
     let (material, radius) = t1();
-    for stretch in [Stretch::Elastic, Stretch::Inextensible] {
+    for (stretch, integrator) in
+        [(Stretch::Elastic, Integrator::ImplicitEuler), (Stretch::Inextensible, Integrator::ImplicitEuler), (Stretch::Elastic, Integrator::TrBdf2)]
+    {
         let spec = RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 60, radius, material.clone()) };
-        let mut world = World::new(Settings::default()).unwrap();
+        let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
         let rod = world.insert_rod(&spec).unwrap();
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
         let second = second_run(&mut world, 30, |_, _| {});

@@ -1,4 +1,4 @@
-//! Vibration of rods, and what implicit Euler makes of it.
+//! Vibration of rods, and what the time integrators make of it.
 
 use super::numeric::roots_above;
 use std::f64::consts::{PI, TAU};
@@ -41,6 +41,24 @@ pub fn euler_frequency(w: f64, h: f64) -> f64 {
 /// Logarithmic decrement per second that implicit Euler gives a mode.
 pub fn euler_decay(w: f64, h: f64) -> f64 {
     0.5 * (w * h * w * h).ln_1p() / h
+}
+
+/// What TR-BDF2 multiplies a mode exp(i w t) by in a substep of w h = `y`: its size and angle. The quotient (1 + (1 - 2 g) z) / (1 - g z)^2 with
+/// g = 1 - 1 / sqrt 2 at z = i y.
+fn tr_bdf2_factor(y: f64) -> (f64, f64) {
+    let g = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
+    let (a, b) = ((1.0 - 2.0 * g) * y, g * y);
+    ((1.0 + a * a).sqrt() / (1.0 + b * b), a.atan() + 2.0 * b.atan())
+}
+
+/// Angular frequency at which TR-BDF2 of substep h lets a mode of angular frequency w swing.
+pub fn tr_bdf2_frequency(w: f64, h: f64) -> f64 {
+    tr_bdf2_factor(w * h).1 / h
+}
+
+/// Logarithmic decrement per second that TR-BDF2 gives a mode.
+pub fn tr_bdf2_decay(w: f64, h: f64) -> f64 {
+    -tr_bdf2_factor(w * h).0.ln() / h
 }
 
 /// Frequency \[Hz\] of a signal that swings about zero, from its crossings (linear between samples).
@@ -96,6 +114,15 @@ mod tests {
         for (h, shift, zeta) in [(1.0 / 60.0, -0.079, 0.251), (1.0 / 600.0, -0.0009, 0.0262)] {
             assert!((euler_frequency(w, h) / w - 1.0 - shift).abs() < 5e-4);
             assert!((euler_decay(w, h) / euler_frequency(w, h) - zeta).abs() < 6e-4, "{}", euler_decay(w, h) / euler_frequency(w, h));
+        }
+    }
+
+    /// Leading terms: slower by 0.0404 (w h)^2, a loss of (w h)^4 g^4 / 2 a substep.
+    #[test]
+    fn tr_bdf2() {
+        for y in [0.05, 0.1] {
+            assert!(((1.0 - tr_bdf2_frequency(y, 1.0) / y) / (y * y) - 0.0404).abs() < 5e-4, "{}", tr_bdf2_frequency(y, 1.0));
+            assert!((tr_bdf2_decay(y, 1.0) / y.powi(4) * 272.0 - 1.0).abs() < 0.01, "{}", tr_bdf2_decay(y, 1.0));
         }
     }
 

@@ -42,7 +42,7 @@ fn bending(square: f64) -> f64 {
 }
 
 /// Points along x with a deflection along z of a thousandth of the length, with chords of equal length.
-fn shaped(n: usize, length: f64, shape: impl Fn(f64) -> f64) -> String {
+pub(super) fn shaped(n: usize, length: f64, shape: impl Fn(f64) -> f64) -> String {
     let link = length / n as f64;
     let mut points = vec![[0.0, 0.0, 1e-3 * length * shape(0.0)]];
     for i in 1..=n {

@@ -29,7 +29,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f
             assemble_rod::<false>(model, state, scratch, h, hessian, rod);
         }
     }
-    assemble_clamps(state, scratch, h);
+    assemble_clamps(state, scratch);
 }
 
 /// Whether the rod that begins with particle `first` is stiffer one way than the other.
@@ -72,10 +72,10 @@ pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratc
 }
 
 /// Adds the moments of the clamps.
-pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch, h: f64) {
+pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch) {
     for c in &scratch.clamps {
         let node = 2 * c.frame as usize + 1;
-        let (moment, b) = clamp_terms(c, state.orientation[c.frame as usize], h);
+        let (moment, b) = clamp_terms(c, state.orientation[c.frame as usize]);
         scratch.rhs[node] += if c.first { -moment } else { moment };
         scratch.system.diagonal[node] += b;
     }
@@ -282,11 +282,11 @@ fn joint_terms<const FLAT: bool>(j: &strain::Joints, plastic: &Vec2, start: &Vec
 }
 
 /// The same for a clamp. The moment is that on the first of the two.
-pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat, h: f64) -> (DVec3, DMat3) {
+pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat) -> (DVec3, DMat3) {
     let (q0, q1) = if c.first { (c.orientation, q) } else { (q, c.orientation) };
     let j = strain::joints([q0; 2], [q1; 2], [c.rest_half; 2]);
     let twice = |v: DVec3| Vec2::load(v, v);
-    let (moment, b) = joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping / h));
+    let (moment, b) = joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping));
     (moment.split().0, b.split().0)
 }
 

@@ -33,7 +33,16 @@ pub(crate) fn joint_angle(q0: DQuat, q1: DQuat, rest_half: DQuat) -> DVec3 {
     log((q0 * rest_half).conjugate() * (q1 * rest_half.conjugate()))
 }
 
-/// The same for two joints, with the derivatives.
+/// Rate of that angle while the two frames turn with angular velocities `w` \[rad/s\], world axes.
+pub(crate) fn joint_rate(q: [DQuat; 2], w: [DVec3; 2], rest_half: DQuat) -> DVec3 {
+    let j = joints([q[0]; 2], [q[1]; 2], [rest_half; 2]);
+    let (angle, c, squared) = (j.angle.split().0, j.c.to_array()[0], j.squared.to_array()[0]);
+    let across = w[1] - w[0];
+    let seen = DVec3::from(j.middle.map(|m| m.split().0.dot(across)));
+    seen * (1.0 + c * squared) - angle * (c * angle.dot(seen))
+}
+
+/// The angles of two joints, with the derivatives.
 #[inline(always)]
 pub(super) fn joints(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> Joints {
     let half = Quat2::load(rest_half[0], rest_half[1]);
@@ -110,6 +119,16 @@ mod tests {
                 assert!(((down - angle) / e + got).length() < 1e-5);
             }
         }
+    }
+
+    #[test]
+    fn rate_matches_differences() {
+        let rest = exp(DVec3::new(0.1, 0.2, -0.15));
+        let q = [exp(DVec3::new(0.3, -0.7, 0.2)), exp(DVec3::new(0.5, 0.4, -0.3))];
+        let w = [DVec3::new(2.0, -1.0, 0.5), DVec3::new(-0.3, 1.5, 0.8)];
+        let at = |t: f64| joint_angle(exp(w[0] * t) * q[0], exp(w[1] * t) * q[1], rest);
+        let (got, want) = (joint_rate(q, w, rest), (at(1e-5) - at(-1e-5)) / 2e-5);
+        assert!((got - want).length() < 1e-8, "{got} {want}");
     }
 
     #[test]

@@ -16,12 +16,15 @@ struct Slider {
 #[derive(Default)]
 pub(crate) struct Sliders {
     sliders: Vec<Slider>,
+    /// Length of the solve \[s\].
+    h: f64,
 }
 
 impl Sliders {
     /// Which shapes may slide. A pushed shape without force stays.
-    pub fn begin(&mut self, model: &Model) {
+    pub fn begin(&mut self, model: &Model, h: f64) {
         self.sliders.clear();
+        self.h = h;
         for (slot, shape) in model.shapes.iter() {
             if let ShapeMotion::Pushed { direction, force, .. } = shape.motion
                 && force > 0.0
@@ -36,7 +39,8 @@ impl Sliders {
     }
 
     /// Puts the force laws into the border.
-    pub fn assemble(&self, model: &Model, state: &State, start: &[crate::math::Pose], h: f64, border: &mut Border) {
+    pub fn assemble(&self, model: &Model, state: &State, start: &[crate::math::Pose], border: &mut Border) {
+        let h = self.h;
         for (k, s) in self.sliders.iter().enumerate() {
             let Some(ShapeMotion::Pushed { force, speed_limit, .. }) = model.shapes.at(s.shape).map(|s| s.motion) else { continue };
             let damper = force / (speed_limit * h);

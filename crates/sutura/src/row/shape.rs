@@ -116,7 +116,7 @@ impl ShapeRow {
 pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
     rows.shapes.clear();
-    rows.sliders.begin(model);
+    rows.sliders.begin(model, h);
     let old = &state.shape_contacts;
     let mut last = None;
     for (slot, e) in &candidates.shapes {
@@ -315,10 +315,10 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
 }
 
 /// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, first: bool) {
+pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
     let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
     rows.border.clear(rows.sliders.count() + rows.welds.count());
-    rows.sliders.assemble(model, state, start_shape_pose, h, &mut rows.border);
+    rows.sliders.assemble(model, state, start_shape_pose, &mut rows.border);
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in &mut rows.shapes {
         if !row.firm {

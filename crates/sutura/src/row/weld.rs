@@ -47,8 +47,9 @@ impl Welds {
         SIX * self.welds.len()
     }
 
-    /// Lists welds and half joints at the start of the substep, before anything has moved.
-    pub fn begin(&mut self, model: &Model, state: &State, joint_on: &mut [bool]) {
+    /// Lists welds and half joints at the start of a solve of length `h`, before anything has moved. Damping acts over the solve, also where it is one of
+    /// two: a cross-section without inertia has no rate of its own.
+    pub fn begin(&mut self, model: &Model, state: &State, joint_on: &mut [bool], h: f64) {
         self.welds.clear();
         self.joints.clear();
         for (slot, weld) in model.welds.iter() {
@@ -59,7 +60,7 @@ impl Welds {
                 if member.before.is_some() && member.after.is_some() {
                     joint_on[member.index(model)] = false;
                 }
-                let damping = model.rods.at(member.rod).expect("welds go with their rods").material.bend_damping;
+                let damping = model.rods.at(member.rod).expect("welds go with their rods").material.bend_damping / h;
                 for half in member.halves(model) {
                     self.joints.push(Joint {
                         weld: k,
@@ -111,10 +112,10 @@ impl Welds {
     }
 
     /// Moments and stiffness of the half joints at the iterate, on the frames.
-    pub fn assemble_joints(&mut self, state: &State, rhs: &mut [DVec3], diagonal: &mut [DMat3], h: f64) {
+    pub fn assemble_joints(&mut self, state: &State, rhs: &mut [DVec3], diagonal: &mut [DMat3]) {
         for j in &mut self.joints {
             j.half.orientation = (state.weld_orientation[self.welds[j.weld].slot as usize] * j.section).normalize();
-            (j.moment, j.stiffness) = clamp_terms(&j.half, state.orientation[j.half.frame as usize], h);
+            (j.moment, j.stiffness) = clamp_terms(&j.half, state.orientation[j.half.frame as usize]);
             let node = 2 * j.half.frame as usize + 1;
             rhs[node] += if j.half.first { -j.moment } else { j.moment };
             diagonal[node] += j.stiffness;
@@ -146,7 +147,7 @@ fn vector(border: &Border, k: usize) -> DVec3 {
 
 /// Makes the rows of welded particles those of the weld: the rods are assembled, nothing is taken out yet.
 pub(crate) fn gather(model: &Model, state: &State, scratch: &mut Scratch, exact: bool) {
-    let Scratch { rows, system, rhs, start, .. } = scratch;
+    let Scratch { rows, system, rhs, .. } = scratch;
     let crate::row::Rows { welds, border, sliders, .. } = rows;
     let first = sliders.count();
     let Welds { welds, joints, links } = welds;
@@ -186,9 +187,9 @@ pub(crate) fn gather(model: &Model, state: &State, scratch: &mut Scratch, exact:
             rhs[n] = DVec3::ZERO;
         }
         let place = welds[k].place;
-        if let Freedom::Line { direction, force, damper } = place {
+        if let Freedom::Line { direction, force, damper, from } = place {
             let i = model.welds.at(welds[k].slot).expect("living").members[0].index(model);
-            let moved = direction.dot(state.position[i] - start[i]);
+            let moved = direction.dot(state.position[i] - from);
             own += outer(direction, direction) * damper;
             right += direction * (force - damper * moved);
         }

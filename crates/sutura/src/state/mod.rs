@@ -6,6 +6,18 @@ use crate::model::grip::{Drive, Hold, LoadKind};
 use crate::model::reel::ReelLaw;
 use glam::{DQuat, DVec3};
 
+/// What the next substep can count on.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) enum Onset {
+    /// Nothing but positions and velocities: something was edited, or nothing was stepped yet.
+    #[default]
+    Unknown,
+    /// Contacts have just changed: accelerations are about to jump.
+    Broken,
+    /// The accelerations in the state are those of its forces.
+    Smooth,
+}
+
 /// One vector a quantity.
 #[derive(Clone, Default)]
 pub struct State {
@@ -22,6 +34,10 @@ pub struct State {
     pub(crate) velocity: Vec<DVec3>,
     pub(crate) orientation: Vec<DQuat>,
     pub(crate) angular_velocity: Vec<DVec3>,
+    /// Rates of the two, without damping, where the integrator needs them and `onset` says that they are known; else empty.
+    pub(crate) acceleration: Vec<DVec3>,
+    pub(crate) angular_acceleration: Vec<DVec3>,
+    pub(crate) onset: Onset,
     /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the multiplier of inextensible elements.
     pub(crate) tension: Vec<f64>,
     /// Plastic bend and twist of the joint before each element \[rad\], part of the rest strain.
@@ -129,6 +145,12 @@ pub(crate) struct ShapeContact {
 }
 
 impl State {
+    /// Forgets the accelerations, for `why`.
+    pub(crate) fn interrupt(&mut self, why: Onset) {
+        self.onset = why;
+        self.acceleration.clear();
+        self.angular_acceleration.clear();
+    }
     /// A copy into memory that is already there.
     pub(crate) fn copy_from(&mut self, from: &State) {
         let State {
@@ -140,6 +162,9 @@ impl State {
             velocity,
             orientation,
             angular_velocity,
+            acceleration,
+            angular_acceleration,
+            onset,
             tension,
             plastic,
             hardened,
@@ -160,6 +185,9 @@ impl State {
         self.velocity.clone_from(velocity);
         self.orientation.clone_from(orientation);
         self.angular_velocity.clone_from(angular_velocity);
+        self.acceleration.clone_from(acceleration);
+        self.angular_acceleration.clone_from(angular_acceleration);
+        self.onset = *onset;
         self.tension.clone_from(tension);
         self.plastic.clone_from(plastic);
         self.hardened.clone_from(hardened);

@@ -21,16 +21,21 @@ pub struct Player<'a> {
     loads: Vec<Option<Handle<Load>>>,
     grips: Vec<Option<(Handle<Grip>, Pose)>>,
     frame: u32,
+    /// Frames in a row in which no acceptable substep was found.
+    stuck: u32,
     /// How often the engine refused what the scene wanted, with an error.
     pub refused: u32,
 }
+
+/// Frames in a row without an acceptable substep after which a scene is over.
+const STUCK: u32 = 2;
 
 impl<'a> Player<'a> {
     /// Builds the world; an error when it refuses the settings. `record` says whether it writes down what is done to it.
     pub fn new(scene: &'a Scene, record: bool) -> Result<Self, Error> {
         let world = Recorder::new(scene.settings.clone(), record)?;
         let grips = vec![None; scene.grips.len()];
-        let mut player = Player { scene, world, rods: Vec::new(), shapes: Vec::new(), loads: Vec::new(), grips, frame: 0, refused: 0 };
+        let mut player = Player { scene, world, rods: Vec::new(), shapes: Vec::new(), loads: Vec::new(), grips, frame: 0, stuck: 0, refused: 0 };
         if scene.other_order {
             player.insert_shapes();
             player.insert_rods();
@@ -145,11 +150,14 @@ impl<'a> Player<'a> {
     pub fn step(&mut self, observe: &mut dyn FnMut(View<'_>)) -> StepReport {
         self.act();
         self.frame += 1;
-        self.world.step_with(self.scene.frame, observe)
+        let report = self.world.step_with(self.scene.frame, observe);
+        let stuck = report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite));
+        self.stuck = if stuck { self.stuck + 1 } else { 0 };
+        report
     }
-    /// Whether there are frames left.
+    /// Whether there are no frames left, or it is stuck for good: each such frame takes all the attempts that the settings allow.
     pub fn is_over(&self) -> bool {
-        self.frame >= self.scene.frames
+        self.frame >= self.scene.frames || self.stuck >= STUCK
     }
     /// Plays to the end.
     pub fn play(mut self) -> Self {

@@ -24,6 +24,9 @@ pub struct Robustness {
     /// How many scenes
     #[arg(long, default_value_t = 10_000)]
     pub scenes: u64,
+    /// Number of the first one, to run them in parts
+    #[arg(long, default_value_t = 0)]
+    pub first: u64,
     /// Seed of all of them
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -116,13 +119,13 @@ impl Robustness {
         if let Ok(style) = ProgressStyle::with_template("{bar:30.blue/white} {pos} of {len} scenes, {eta} left {msg}") {
             bar.set_style(style.progress_chars("━━─"));
         }
-        let (next, found) = (AtomicU64::new(0), Mutex::new(Found::default()));
+        let (next, found) = (AtomicU64::new(self.first), Mutex::new(Found::default()));
         std::thread::scope(|scope| {
             for _ in 0..self.jobs {
                 scope.spawn(|| {
                     loop {
                         let number = next.fetch_add(1, Ordering::Relaxed);
-                        if number >= self.scenes {
+                        if number >= self.first.saturating_add(self.scenes) {
                             return;
                         }
                         let ended = apart(self.seed, number, Duration::from_secs_f64(self.limit));

@@ -41,6 +41,13 @@ impl Endpoint {
         Endpoint { element, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
     }
 
+    /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
+    fn restricted(&self, freedom: &[Freedom]) -> Self {
+        let keep = |node: usize, columns: DMat3| if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns };
+        let (x, t) = (2 * self.element, 2 * self.element + 1);
+        Endpoint { here: Columns { x: keep(x, self.here.x), t: keep(t, self.here.t) }, next: keep(x + 2, self.next), ..*self }
+    }
+
     fn push(&self, force: DVec3, right: &mut [DVec3]) {
         right[2 * self.element] += self.here.x * force;
         right[2 * self.element + 1] += self.here.t * force;
@@ -128,7 +135,7 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let Scratch { rods, rows, system, step, start, start_frame, start_shape_pose, .. } = scratch;
+    let Scratch { rods, rows, system, step, start, start_frame, start_shape_pose, freedom, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
     entries.clear();
@@ -154,7 +161,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         endpoints.clear();
         for (k, entry) in entries.iter().enumerate() {
             let inside = |p: &&Endpoint| zone.contains(&p.element) && p.element + 1 < zone.end;
-            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: *at }));
+            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
         }
         if endpoints.is_empty() {
             continue;

@@ -10,7 +10,7 @@ use std::process::ExitCode;
 use tally::Tally;
 
 const HELP: &str = "\
-cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes, same bits on every run
+cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes, same bits in every build
 cargo xtask test [ARGS]      all tests (`cargo test --workspace`), with a count at the end
 cargo xtask scenes [NAMES]   run sample scenes with the release build; all of them without names
 cargo xtask bench [ARGS]     `sutura bench` with the release build
@@ -29,7 +29,7 @@ fn main() -> ExitCode {
         _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
         "ci" => ci::everything(&mut tally),
         "test" => ci::tests(&mut tally, rest),
-        "scenes" => ci::scenes(&mut tally, rest),
+        "scenes" => drop(ci::scenes(&mut tally, rest)),
         "bench" => program::bench(&mut tally, rest),
         "bless" => program::bless(&mut tally),
         "release" => release::ready(&mut tally),

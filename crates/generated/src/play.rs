@@ -249,7 +249,7 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
             *seen.incidents.entry(kind(&incident.kind)).or_default() += 1;
         }
         seen.fault = fault(&player.world, scene.frame, &report);
-        if seen.fault.is_none() && audited && audit.report().passes_through && seen.incidents.get("passed through").is_none() {
+        if seen.fault.is_none() && audited && audit.report().passes_through && !seen.incidents.contains_key("passed through") {
             seen.fault = Some(format!("passed through unsaid: {:?}", audit.report().crossings.first()));
         }
     }

@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         while !runner.step_frame().finished {}
         let outcome = runner.finish();
         let input = outcome.input.ok_or("nothing was recorded")?;
-        println!("{} {} {:.1} s CPU", outcome.report.state_hash, outcome.report.scene, outcome.report.cpu_s);
+        let report = outcome.report;
+        println!("{} {} {} in {:.1} s CPU", report.state_hash, report.scene, if report.passed { "passed" } else { "FAILED" }, report.cpu_s);
         std::fs::write(file, input.to_bytes())?;
     }
     Ok(())

@@ -131,7 +131,8 @@ impl Robustness {
                         let ended = apart(self.seed, number, Duration::from_secs_f64(self.limit));
                         let mut found = found.lock().expect("nothing panics while it is held");
                         if let Some(line) = found.take(number, numbered(self.seed, number).0, ended) {
-                            bar.println(line);
+                            // A bar that is not drawn prints nothing.
+                            bar.suspend(|| eprintln!("{line}"));
                         }
                         bar.inc(1);
                     }

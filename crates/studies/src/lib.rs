@@ -6,6 +6,7 @@ pub mod curve;
 pub mod hold;
 pub mod map;
 pub mod overhand;
+pub mod robustness;
 pub mod run;
 pub mod session;
 pub mod table;

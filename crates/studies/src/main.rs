@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use sutura_studies::case::{Budget, Filter, seconds};
 use sutura_studies::hold::{self, Hold};
 use sutura_studies::overhand::{self, Overhand};
+use sutura_studies::robustness::Robustness;
 use sutura_studies::run::{Plan, Study, run};
 
 /// Parameter studies of Sutura. Cases that are in the table already are left out.
@@ -34,6 +35,8 @@ enum Which {
         #[arg(long = "try", value_name = "KEY=VALUE,...", conflicts_with_all = ["only", "again", "jobs"])]
         one: Option<String>,
     },
+    /// Scenes of a generator, half of them absurd: no panic, no hang, no number that is not finite, the same bits however they are played
+    Robustness(Robustness),
 }
 
 #[derive(Args, Debug)]
@@ -92,6 +95,11 @@ fn main() -> ExitCode {
         Which::Hold { common, one: Some(case) } => hold::Case::parse(&case).map(|case| {
             Hold::run(&case, common.budget(), &mut |line| eprintln!("{line}"));
         }),
+        Which::Robustness(robustness) => match robustness.run() {
+            Ok(true) => Ok(()),
+            Ok(false) => return ExitCode::FAILURE,
+            Err(e) => Err(e),
+        },
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -39,6 +39,8 @@ pub enum Command {
     Bench(Bench),
     /// Compare what this build computes with theory
     Validate(Validate),
+    /// Do a recorded input again and compare the state after every step
+    Replay(Replay),
 }
 
 /// Run a scene: simulate, measure, check, plot and draw it.
@@ -50,6 +52,7 @@ The folder then holds:
   plots/*.png, *.svg  the same as curves
   stills/*.png        pictures of the whole thread and of its knot
   trajectory.sutura   positions and orientations of every recorded frame
+  input.sutura        with --record: what was done to the world, for `sutura replay`
 Files that an earlier run left in the same folder are replaced.
 
 Examples:
@@ -93,6 +96,9 @@ pub struct Run {
     /// Direction in which the pictures look, for instance `0,1,-0.5` [default: the scene's, or one from which the knot is seen well]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     pub look: Option<[f64; 3]>,
+    /// Record what is done to the world, with the state hash after every step, as input.sutura for `sutura replay`
+    #[arg(long, conflicts_with = "dry")]
+    pub record: bool,
     /// Draw no progress bar and no table
     #[arg(long, short)]
     pub quiet: bool,
@@ -283,6 +289,41 @@ pub struct Validate {
     /// Write no file, print what missed its bar
     #[arg(long, conflicts_with = "out")]
     pub dry: bool,
+}
+
+/// Do a recorded input again and compare the state after every step.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+FILE holds everything that was done to a world, step by step, and the hash of the state after each step: `sutura run --record` writes one. \
+The same input gives the same states in every build and on every machine. Where it does not, the first step that differs is told, and \
+what was done before it; to see by how much, write the state there from both machines (--until, --state) and compare the tables.
+
+Examples:
+  sutura run overhand --record && sutura replay out/overhand/input.sutura
+  sutura replay here.sutura --with there.sutura       compare two recordings, run nothing
+  sutura replay input.sutura --list                   say what was done, run nothing
+  sutura replay input.sutura --until 0.5 --state here.csv
+                                                      the numbers of the state at half a second
+
+Exit codes: 0 the same after every step; 1 it differs; 2 the file could not be used.")]
+pub struct Replay {
+    /// Recorded input
+    pub file: PathBuf,
+    /// Compare with this recording instead of running: inputs and states
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "state", "list"])]
+    pub with: Option<PathBuf>,
+    /// Stop at this simulated time [s]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub until: Option<f64>,
+    /// Write the numbers of the last state here, a table with their bits
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
+    /// List what was done, run nothing
+    #[arg(long, conflicts_with_all = ["until", "state"])]
+    pub list: bool,
+    /// Print nothing when all is the same
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 fn setting(text: &str) -> Result<(String, String), String> {

@@ -5,6 +5,7 @@ mod bench;
 mod knot;
 mod plot;
 mod presets;
+mod replay;
 mod run;
 mod scenes;
 mod still;
@@ -31,6 +32,7 @@ fn main() -> ExitCode {
         Some(Command::Presets(a)) => presets::presets(&a).map(|()| true),
         Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
         Some(Command::Validate(a)) => validate::validate(&a),
+        Some(Command::Replay(a)) => replay::replay(&a),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

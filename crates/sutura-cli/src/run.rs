@@ -27,7 +27,7 @@ pub fn run(args: &Run) -> anyhow::Result<bool> {
         // Before the work, so that a folder that cannot be written is found at once.
         std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     }
-    let outcome = simulate(Runner::new(scene.clone())?, args.quiet);
+    let outcome = simulate(if args.record { Runner::recording(scene.clone())? } else { Runner::new(scene.clone())? }, args.quiet);
     if !args.dry {
         write(&outcome, &scene, &folder, args)?;
     }
@@ -94,6 +94,9 @@ fn write(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow:
     }
     for state in &outcome.saved {
         put(&folder.join(file_name(&state.name)), &state.bytes)?;
+    }
+    if let Some(input) = &outcome.input {
+        put(&folder.join("input.sutura"), &input.to_bytes())?;
     }
     if !args.no_trajectory {
         let path = folder.join("trajectory.sutura");

@@ -258,3 +258,50 @@ fn values_of_a_scene_can_be_set() {
     assert_eq!(wrong.status.code(), Some(2));
     assert!(text(&wrong.stderr).contains("thread.thread.elments = 5") && text(&wrong.stderr).contains("`elements`"), "{}", text(&wrong.stderr));
 }
+
+#[test]
+fn a_recorded_run_replays_to_the_same_state_after_every_step() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_swing(folder.path(), "0 m");
+    let files = ["--no-plots", "--no-stills", "--no-trajectory"];
+    let run = |out: &str, more: &[&str]| {
+        let args = [&["run", "swing.toml", "--quiet", "--record", "--out", out], &files[..], more].concat();
+        assert!(sutura(folder.path(), &args).status.success());
+        format!("{out}/input.sutura")
+    };
+    let (one, same, other) = (run("one", &[]), run("same", &[]), run("other", &["--set", "thread.thread.density=1151 kg/m^3"]));
+    let said = |args: &[&str]| {
+        let output = sutura(folder.path(), &[&["replay"], args].concat());
+        (output.status.code(), text(&output.stdout))
+    };
+
+    let (code, out) = said(&[&one]);
+    let report = std::fs::read_to_string(folder.path().join("one/report.json")).expect("a report");
+    let hash = out.trim().rsplit(' ').next().expect("the last word is the hash").to_string();
+    assert!(code == Some(0) && out.contains("the same state after every step") && report.contains(&hash), "{out}");
+    assert_eq!(said(&[&one, "--quiet"]), (Some(0), String::new()));
+
+    assert_eq!(said(&[&one, "--with", &same]).0, Some(0));
+    let (code, out) = said(&[&one, "--with", &other]);
+    assert!(code == Some(1) && out.contains("the same for 0 steps") && out.contains("InsertRod"), "{out}");
+
+    // The first of the steps whose recorded state is not what the input gives is told.
+    let path = folder.path().join(&one);
+    let mut bytes = std::fs::read(&path).expect("a recording");
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&path, &bytes).expect("a temporary folder can be written");
+    let (code, out) = said(&[&one]);
+    assert!(code == Some(1) && out.contains("differs after step 6 first"), "{out}");
+    assert_eq!(said(&[&one, "--until", "0.05"]).0, Some(0));
+
+    let (code, _) = said(&[&same, "--until", "0.05", "--state", "state.csv"]);
+    let state = std::fs::read_to_string(folder.path().join("state.csv")).expect("a table");
+    assert!(code == Some(0) && state.lines().count() > 21 * 6 && state.contains("thread 0 position,20,2,"), "{state}");
+    let (code, list) = said(&[&same, "--list"]);
+    assert!(code == Some(0) && list.lines().filter(|l| l.starts_with("Step(")).count() == 6 && list.contains("InsertGrip"), "{list}");
+
+    std::fs::write(&path, &bytes[..last]).expect("a temporary folder can be written");
+    assert_eq!(said(&[&one]).0, Some(2));
+    assert_eq!(said(&["swing.toml"]).0, Some(2));
+}

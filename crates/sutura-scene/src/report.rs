@@ -2,6 +2,7 @@
 
 use crate::trajectory::Trajectory;
 use serde::{Deserialize, Serialize};
+use sutura::input::Recording;
 
 /// Everything that a run leaves behind.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +15,8 @@ pub struct Outcome {
     pub trajectory: Trajectory,
     /// States that phases asked to save.
     pub saved: Vec<SavedState>,
+    /// What was done to the world, where it was to be recorded.
+    pub input: Option<Recording>,
 }
 
 /// A state to write to a file, so that another scene can start from it.

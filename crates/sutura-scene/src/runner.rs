@@ -67,7 +67,15 @@ const GIVE_UP: u32 = 30;
 impl Runner {
     /// Builds the world of a scene.
     pub fn new(scene: Scene) -> Result<Runner, SceneError> {
-        let stage = Stage::new(&scene)?;
+        Self::build(scene, false)
+    }
+    /// The same, and what is done to the world is recorded, with the state hash after each step (whose time counts as the solver's).
+    pub fn recording(scene: Scene) -> Result<Runner, SceneError> {
+        Self::build(scene, true)
+    }
+
+    fn build(scene: Scene, record: bool) -> Result<Runner, SceneError> {
+        let stage = Stage::new(&scene, record)?;
         let n = scene.threads.len();
         let columns = [
             ("time", "s"),
@@ -469,7 +477,7 @@ impl Runner {
             work: self.work,
             phases: self.phases,
         };
-        Outcome { report, series, trajectory: self.trajectory, saved: self.saved }
+        Outcome { report, series, trajectory: self.trajectory, saved: self.saved, input: self.stage.world.take_recording() }
     }
 
     fn thread_reports(&self) -> Vec<ThreadReport> {

@@ -11,11 +11,11 @@ use crate::saved::{Event, SavedFile};
 use crate::scene::{Action, LoadDef, Mover, Scene, Step};
 use std::cell::RefCell;
 use sutura::glam::{DQuat, DVec3};
+use sutura::input::Recorder;
 use sutura::knot::Entries;
 use sutura::math::log;
 use sutura::{
     Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
-    World,
 };
 
 /// A grip that holds.
@@ -98,7 +98,7 @@ pub fn lesser(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 
 /// The world with its names.
 pub struct Stage {
-    pub world: World,
+    pub world: Recorder,
     pub threads: Vec<Handle<Rod>>,
     pub shapes: Vec<Handle<Shape>>,
     reels: Vec<Handle<Reel>>,
@@ -132,10 +132,10 @@ struct Names {
 }
 
 impl Stage {
-    /// Builds the world of a scene, takes up a saved state, and applies what stands at the beginning.
-    pub fn new(scene: &Scene) -> Result<Stage, SceneError> {
+    /// Builds the world of a scene (which records what is done to it, if it is to), takes up a saved state, and applies what stands at the beginning.
+    pub fn new(scene: &Scene, record: bool) -> Result<Stage, SceneError> {
         let at = |location: &Location, e: Error| location.error(e.to_string());
-        let mut world = World::new(scene.settings.clone()).map_err(|e| at(&scene.solver_location, e))?;
+        let mut world = Recorder::new(scene.settings.clone(), record).map_err(|e| at(&scene.solver_location, e))?;
         for (a, b, friction, location) in &scene.frictions {
             world.set_friction(*a, *b, *friction).map_err(|e| at(location, e))?;
         }

@@ -7,6 +7,7 @@ pub mod audit;
 mod collide;
 pub mod error;
 pub mod handle;
+pub mod input;
 mod integrator;
 #[doc(hidden)]
 pub mod kernels;

@@ -12,24 +12,24 @@ use glam::{DQuat, DVec3};
 const MAGIC: &[u8; 8] = b"sutura\x03\0";
 
 /// Something that is written and read back without loss.
-trait Bytes: Sized {
+pub(crate) trait Bytes: Sized {
     fn put(&self, out: &mut Vec<u8>);
     fn take(input: &mut Reader<'_>) -> Result<Self, Error>;
 }
 
-struct Reader<'a> {
-    left: &'a [u8],
+pub(crate) struct Reader<'a> {
+    pub left: &'a [u8],
 }
 
 impl Reader<'_> {
-    fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
+    pub fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
         let (head, tail) = self.left.split_first_chunk::<N>().ok_or_else(|| damaged("it ends too early"))?;
         self.left = tail;
         Ok(*head)
     }
 }
 
-fn damaged(reason: impl Into<String>) -> Error {
+pub(crate) fn damaged(reason: impl Into<String>) -> Error {
     Error::Snapshot { reason: reason.into() }
 }
 
@@ -164,6 +164,8 @@ macro_rules! variants {
         }
     };
 }
+
+pub(crate) use {structure, variants};
 
 variants!(ReelLaw { 0 => Rate(rate), 1 => Brake(force) });
 variants!(Onset { 0 => Unknown, 1 => Broken, 2 => Smooth });

@@ -3,6 +3,7 @@
 use crate::fuzz;
 use crate::program::{self, Profile};
 use crate::tally::{Tally, cargo, root};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Scenes that the whole check leaves out, and why. `cargo xtask scenes` runs them all.
@@ -14,9 +15,9 @@ const LONGEST: Duration = Duration::from_secs(300);
 /// How long each fuzz target is tried \[s\], beyond its corpus, which the tests replay. `cargo xtask fuzz` takes longer.
 const FUZZING: f64 = 20.0;
 
-/// Scenes whose last state must be the same on every run and in every build: a free thread, and one in contact with a shape. The
-/// unoptimized build runs them too, so they are quick ones.
-const SAME_BITS: &[&str] = &["hanging_helix", "capstan"];
+/// Scenes that the debug build runs whole, with their motions, conditions and audit: a free thread, and one in contact with a shape. Of all
+/// others it does again what the release build recorded.
+const RUN_AGAIN: &[&str] = &["hanging_helix", "capstan"];
 
 /// Everything.
 pub fn everything(tally: &mut Tally) {
@@ -30,8 +31,8 @@ pub fn everything(tally: &mut Tally) {
     if program::build(tally, Profile::Debug).is_some() {
         tally.run("example of the README", &mut program::example("first_thread"));
     }
-    scenes(tally, &[]);
-    same_bits(tally);
+    let recorded = scenes(tally, &[]);
+    same_bits(tally, &recorded);
     fuzz::run(tally, None, FUZZING);
 }
 
@@ -42,49 +43,62 @@ pub fn tests(tally: &mut Tally, args: &[String]) {
     tally.run_tests("cargo test --workspace", command.args(args));
 }
 
-/// Runs scenes with the release build: the named ones, or all but those left out.
-pub fn scenes(tally: &mut Tally, names: &[String]) {
-    let Some(sutura) = program::build(tally, Profile::Release) else { return };
+/// Runs scenes with the release build: the named ones, or all but those left out. Names of those that ran, with their recorded inputs.
+pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<(String, PathBuf)> {
+    let Some(sutura) = program::build(tally, Profile::Release) else { return Vec::new() };
     let all = match sample_names() {
         Ok(all) => all,
-        Err(why) => return tally.count("scenes", Err(why)),
+        Err(why) => {
+            tally.count("scenes", Err(why));
+            return Vec::new();
+        }
     };
     println!();
+    let mut recorded = Vec::new();
     for name in if names.is_empty() { &all } else { names } {
         let step = format!("scene {name}");
         match LEFT_OUT.iter().find(|(n, _)| n == name) {
             Some((_, why)) if names.is_empty() => tally.skip(&step, why),
             _ => {
                 let result = sutura.run_scene(name, &format!("{name}-check"), LONGEST);
-                if let Ok(report) = &result {
-                    println!("   {step}: passed, {:.1} s simulated in {:.1} s CPU", report.simulated, report.cpu);
-                }
-                tally.count(&step, result.map(|_| ()));
+                tally.count(
+                    &step,
+                    result.map(|report| {
+                        println!("   {step}: passed, {:.1} s simulated in {:.1} s CPU", report.simulated, report.cpu);
+                        recorded.push((name.clone(), report.input));
+                    }),
+                );
             }
         }
     }
+    recorded
 }
 
-/// The same bits twice from one build, and from two builds.
-fn same_bits(tally: &mut Tally) {
+/// Every scene has the same state after every step in the debug build and in one for other features of the processor.
+fn same_bits(tally: &mut Tally, recorded: &[(String, PathBuf)]) {
     let (Some(release), Some(debug)) = (program::build(tally, Profile::Release), program::build(tally, Profile::Debug)) else { return };
     println!();
-    for name in SAME_BITS {
-        let hash = |sutura: &program::Program, run: &str| sutura.run_scene(name, &format!("{name}-{run}"), LONGEST).map(|r| r.state_hash);
-        let (first, second, other) = (hash(&release, "first"), hash(&release, "second"), hash(&debug, "debug"));
-        let mut compare = |step: &str, a: &Result<String, String>, b: &Result<String, String>| {
-            let result = match (a, b) {
-                (Ok(a), Ok(b)) if a == b => Ok(()),
-                (Ok(a), Ok(b)) => Err(format!("the states differ: {a} and {b}")),
-                (Err(why), _) | (_, Err(why)) => Err(why.clone()),
-            };
-            if result.is_ok() {
-                println!("   {name}, {step}: the same bits");
-            }
-            tally.count(&format!("same bits of {name}, {step}"), result);
-        };
-        compare("two runs", &first, &second);
-        compare("release and debug builds", &first, &other);
+    let count = |tally: &mut Tally, step: String, result: Result<(), String>| {
+        if result.is_ok() {
+            println!("   {step}");
+        }
+        tally.count(&step, result);
+    };
+    for (name, input) in recorded {
+        count(tally, format!("same bits of {name}, debug build"), debug.replay(input, LONGEST));
+        if RUN_AGAIN.contains(&name.as_str()) {
+            let again = debug.run_scene(name, &format!("{name}-debug"), LONGEST).and_then(|report| release.compare(input, &report.input));
+            count(tally, format!("same bits of {name}, run by the debug build"), again);
+        }
+    }
+    let step = format!("build for {}", program::OTHER_FEATURES);
+    if !program::has_other_features() {
+        return tally.skip(&step, "this processor is not one of them");
+    }
+    let Some(recorder) = program::build_for_other_features(tally, &step) else { return };
+    for (name, input) in recorded {
+        let result = recorder.record(name, LONGEST).and_then(|other| release.compare(input, &other));
+        count(tally, format!("same bits of {name}, {step}"), result);
     }
 }
 
@@ -108,7 +122,7 @@ mod tests {
     #[test]
     fn scenes_that_are_named_here_exist() {
         let all = sample_names().unwrap();
-        for name in LEFT_OUT.iter().map(|(name, _)| name).chain(SAME_BITS) {
+        for name in LEFT_OUT.iter().map(|(name, _)| name).chain(RUN_AGAIN) {
             assert!(all.iter().any(|n| n == name), "{name}");
         }
     }

@@ -19,7 +19,8 @@ pub struct Program {
 
 /// What a run reported, as far as the checks need it.
 pub struct Report {
-    pub state_hash: String,
+    /// What was done to the world, with the state hash after every step.
+    pub input: PathBuf,
     pub simulated: f64,
     pub cpu: f64,
 }
@@ -55,7 +56,7 @@ impl Program {
         let out = target().join("scenes").join(run);
         let file = format!("scenes/{name}.toml");
         let mut command = self.command();
-        command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--no-trajectory", "--out"]).arg(&out);
+        command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--no-trajectory", "--record", "--out"]).arg(&out);
         // A report of an earlier run must not pass for that of this one.
         let _ = std::fs::remove_file(out.join("report.json"));
         let ended = status_within(&mut command, limit);
@@ -66,6 +67,51 @@ impl Program {
             (Err(why), _) | (_, Err(why)) => Err(why),
         }
     }
+
+    /// Does a recorded input again; an error when the state is another one after any step.
+    pub fn replay(&self, input: &Path, limit: Duration) -> Result<(), String> {
+        status_within(self.command().args(["replay", "--quiet"]).arg(input), limit)
+    }
+
+    /// Compares two recorded inputs and their states.
+    pub fn compare(&self, input: &Path, other: &Path) -> Result<(), String> {
+        status_within(self.command().args(["replay", "--quiet"]).arg(input).arg("--with").arg(other), Duration::from_secs(60))
+    }
+
+    /// Runs a sample scene with the recorder of another build; what it recorded.
+    pub fn record(&self, name: &str, limit: Duration) -> Result<PathBuf, String> {
+        let out = target().join("scenes/other-features");
+        let input = out.join(format!("{name}.input"));
+        let _ = std::fs::remove_file(&input);
+        status_within(self.command().arg(out).arg(format!("scenes/{name}.toml")).stdout(Stdio::null()), limit)?;
+        Ok(input)
+    }
+}
+
+/// Features of the processor for which a second build is made: with AVX2 and fused multiply-add the compiler may vectorize and contract
+/// otherwise, and must not.
+pub const OTHER_FEATURES: &str = "x86-64-v3";
+
+/// Whether this processor has them.
+pub fn has_other_features() -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return std::is_x86_feature_detected!("avx2")
+        && std::is_x86_feature_detected!("bmi2")
+        && std::is_x86_feature_detected!("f16c")
+        && std::is_x86_feature_detected!("fma")
+        && std::is_x86_feature_detected!("lzcnt")
+        && std::is_x86_feature_detected!("movbe");
+    #[cfg(not(target_arch = "x86_64"))]
+    return false;
+}
+
+/// A recorder of scenes for these features: not the whole program, which takes several times as long to build.
+pub fn build_for_other_features(tally: &mut Tally, step: &str) -> Option<Program> {
+    let folder = target().join("other-features");
+    let mut command = cargo(&["build", "--release", "--package", "sutura-scene", "--example", "record", "--target-dir"]);
+    command.arg(&folder).env("RUSTFLAGS", format!("-C target-cpu={OTHER_FEATURES}"));
+    let path = folder.join("release/examples").join(format!("record{}", std::env::consts::EXE_SUFFIX));
+    tally.run(step, &mut command).then_some(Program { path })
 }
 
 /// The report in a folder, and its checks that failed.
@@ -74,10 +120,10 @@ fn read(path: &Path) -> Result<(Report, Vec<String>), String> {
     let text = std::fs::read_to_string(path).map_err(|e| problem(&e))?;
     let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| problem(&e))?;
     let number = |key: &str| json[key].as_f64().ok_or_else(|| problem(&format!("no number `{key}`")));
-    let state_hash = json["state_hash"].as_str().ok_or_else(|| problem(&"no `state_hash`"))?.to_string();
+    let input = path.with_file_name("input.sutura");
     let checks = json["checks"].as_array().into_iter().flatten().filter(|c| c["passed"] == false);
     let failed = checks.map(|c| format!("{} is {}, wanted {}", c["name"], c["value"], c["wanted"])).collect();
-    Ok((Report { state_hash, simulated: number("simulated_s")?, cpu: number("cpu_s")? }, failed))
+    Ok((Report { input, simulated: number("simulated_s")?, cpu: number("cpu_s")? }, failed))
 }
 
 /// Times the release build.
@@ -92,7 +138,7 @@ pub fn bless(tally: &mut Tally) {
     let Some(sutura) = build(tally, Profile::Release) else { return };
     let out = target().join("scenes/square_knot-picture");
     let mut run = sutura.command();
-    run.args(["run", "scenes/square_knot.toml", "--no-plots", "--no-trajectory", "--out"]).arg(&out);
+    run.args(["run", "scenes/square_knot.toml", "--no-plots", "--no-trajectory", "--record", "--out"]).arg(&out);
     if !tally.run("square knot", &mut run) {
         return;
     }

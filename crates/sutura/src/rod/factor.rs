@@ -142,9 +142,12 @@ impl System {
         self.transfer.resize(n_particles, Block::default());
     }
 
-    /// Takes a node out of the system: its unknown becomes zero times `1 - keep`, where `keep` projects on the free directions.
+    /// Takes a node out of the system: its unknown becomes zero times `1 - keep`, where `keep` projects on the free directions. What is taken out
+    /// is as stiff as the rest, so that rounding is the same at any scale.
     pub fn restrict(&mut self, node: usize, keep: DMat3) {
-        self.diagonal[node] = keep * self.diagonal[node] * keep + (DMat3::IDENTITY - keep);
+        let d = &self.diagonal[node];
+        let size = d.x_axis.x.abs().max(d.y_axis.y.abs()).max(d.z_axis.z.abs());
+        self.diagonal[node] = keep * *d * keep + (DMat3::IDENTITY - keep) * size;
         self.next[node] = keep * self.next[node];
         self.after[node] = keep * self.after[node];
         if node >= 1 {

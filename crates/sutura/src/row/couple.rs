@@ -41,16 +41,11 @@ impl Endpoint {
         Endpoint { element, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
     }
 
-    /// Only what acts on free directions of its nodes.
-    fn on_free(&self, freedom: &[Freedom]) -> Endpoint {
-        let mut free = *self;
-        let k = 2 * self.element;
-        for (node, columns) in [(k, &mut free.here.x), (k + 1, &mut free.here.t), (k + 2, &mut free.next)] {
-            if freedom[node] != Freedom::Free {
-                *columns = freedom[node].projector() * *columns;
-            }
-        }
-        free
+    /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
+    fn restricted(&self, freedom: &[Freedom]) -> Self {
+        let keep = |node: usize, columns: DMat3| if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns };
+        let (x, t) = (2 * self.element, 2 * self.element + 1);
+        Endpoint { here: Columns { x: keep(x, self.here.x), t: keep(t, self.here.t) }, next: keep(x + 2, self.next), ..*self }
     }
 
     fn push(&self, force: DVec3, right: &mut [DVec3]) {
@@ -166,7 +161,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         endpoints.clear();
         for (k, entry) in entries.iter().enumerate() {
             let inside = |p: &&Endpoint| zone.contains(&p.element) && p.element + 1 < zone.end;
-            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: at.on_free(freedom) }));
+            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
         }
         if endpoints.is_empty() {
             continue;

@@ -121,7 +121,8 @@ fn all_finite(model: &Model, state: &State) -> bool {
         .iter()
         .map(|c| {
             let radius = model.rods.at(model.rod_of[c.element as usize]).map_or(0.0, |r| r.radius);
-            let arm = state.position[c.element as usize] - c.normal * radius - state.shape_pose[c.shape as usize].position;
+            let at = state.position[c.element as usize].lerp(state.position[c.element as usize + 1], c.s);
+            let arm = at - c.normal * radius - state.shape_pose[c.shape as usize].position;
             let force = c.normal * c.normal_force + c.friction;
             force.abs() + arm.cross(force).abs()
         })

@@ -139,11 +139,19 @@ fn all_finite(model: &Model, state: &State) -> bool {
     let grips = state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
     let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
     let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
-    let on_shapes = state.shape_contacts.iter().all(|c| {
-        let arm = state.position[c.element as usize] - state.shape_pose[c.shape as usize].position;
-        arm.cross(c.normal * c.normal_force + c.friction).is_finite()
-    });
-    grips && shapes && threads && on_shapes && crate::rod::in_proportion(model, state)
+    // What threads do to a shape is read as a sum.
+    let on_shapes: DVec3 = state
+        .shape_contacts
+        .iter()
+        .map(|c| {
+            let radius = model.rods.at(model.rod_of[c.element as usize]).map_or(0.0, |r| r.radius);
+            let at = state.position[c.element as usize].lerp(state.position[c.element as usize + 1], c.s);
+            let arm = at - c.normal * radius - state.shape_pose[c.shape as usize].position;
+            let force = c.normal * c.normal_force + c.friction;
+            force.abs() + arm.cross(force).abs()
+        })
+        .sum();
+    grips && shapes && threads && on_shapes.is_finite() && crate::rod::in_proportion(model, state)
 }
 
 /// What a substep came to.

@@ -115,3 +115,19 @@ fn a_free_thread_keeps_its_length_and_falls() {
     }
     assert!(worst < 1e-5, "{worst:e}");
 }
+
+#[test]
+fn the_elastic_energy_of_a_cantilever_is_half_the_work_of_its_load() {
+    // In the joints, and in the half joint that the clamp holds. Few elements, so that it counts.
+    for n in [4, 9] {
+        let (mut world, rod) = cantilever(0.05, n, quiet());
+        let force = DVec3::NEG_Z * 1e-5;
+        let before = tip(&world, rod);
+        world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+        settle(&mut world, 0.1, 1e-9, 200.0);
+        let work = 0.5 * force.dot(tip(&world, rod) - before);
+        let energy = world.rod(rod).unwrap().energy().total();
+        // The deflection is a hundredth of the length: it is linear to its square.
+        assert!((energy / work - 1.0).abs() < 1e-3, "{n}: {energy:e} {work:e}");
+    }
+}

@@ -285,35 +285,6 @@ fn linked_rings_stay_linked_and_hang_on_each_other() {
 }
 
 #[test]
-fn what_touches_a_held_piece_bears_on_it() {
-    // A thread laid across another one between the jaws of two grips: it rests on the held elements themselves.
-    let (material, radius) = t1();
-    let material = sutura::Material { bend_damping: 0.01, ..material };
-    let mut world = World::new(Settings { linear_damping: 0.99, ..Settings::default() }).unwrap();
-    let below = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 2e-3, 4, radius, material.clone())).unwrap();
-    for e in [0, 3] {
-        world.insert_grip(&GripSpec::at_once(below, Place::Element(e), Hold::Jaw)).unwrap();
-    }
-    let x = 0.2e-3;
-    let from = DVec3::new(x, -5e-3, 2.1 * radius);
-    let above = world.insert_rod(&RodSpec::straight(from, from + DVec3::Y * 1e-2, 20, radius, material)).unwrap();
-    // Kept level and over the middle of a held element.
-    for place in [Place::Start, Place::End] {
-        let grip = GripSpec::at_once(above, place, Hold::Pin);
-        world.insert_grip(&grip).unwrap();
-    }
-    pull(&mut world, above, Place::Particle(10), DVec3::NEG_Z * 0.2);
-    let mut audit = Audit::new();
-    for _ in 0..60 {
-        let report = world.step_with(1.0 / 60.0, &mut |v| audit.observe(v));
-        assert!(report.incidents.is_empty(), "{:?}", report.incidents);
-    }
-    assert!(audit.report().thread_clearance.unwrap() > -0.05, "{:?}", audit.report().thread_clearance);
-    let force: f64 = world.contacts().map(|c| c.force.z.abs()).sum();
-    assert!(force > 0.1, "{force}");
-}
-
-#[test]
 fn an_inextensible_ring_keeps_its_length_and_momentum() {
     let spec = RodSpec { stretch: Stretch::Inextensible, ..ring(50) };
     let (mut world, rod) = world(Settings { substep: 1.0 / 960.0, ..quiet() }, &spec);

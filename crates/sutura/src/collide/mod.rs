@@ -200,19 +200,37 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
         }
     }
     // Neighboring elements share a particle.
-    let mut last = None;
+    let mut last: Option<((u32, usize), Distance)> = None;
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
         let r = radius[e];
-        for (i, s) in [(e, 0.0), (e, 0.5), (e + 1, 1.0)] {
-            if s == 0.0 && last == Some((*slot, e)) {
+        let mut found = [last.filter(|(at, _)| *at == (*slot, e)).map(|(_, seen)| seen), None, None];
+        // The ends and the middle, then, where the surface may come nearer between these (an edge across the element), the nearest place.
+        for look in 0..4 {
+            let s = if let [Some(first), Some(middle), Some(end)] = found {
+                let along = x[e + 1] - x[e];
+                match shape.collider.nearest_between([first, middle, end], &state.shape_pose[k], [x[e], x[e + 1]], along, r * (1.0 - 2.0 * params::OVERLAP)) {
+                    Some(s) => s,
+                    None => break,
+                }
+            } else if found[look.min(2)].is_some() {
                 continue;
-            }
-            let at = |x: &[DVec3]| if s == 0.5 { (x[e] + x[e + 1]) * 0.5 } else { x[i] };
+            } else {
+                0.5 * look as f64
+            };
+            let at = |x: &[DVec3]| match s {
+                0.0 => x[e],
+                0.5 => (x[e] + x[e + 1]) * 0.5,
+                1.0 => x[e + 1],
+                s => x[e].lerp(x[e + 1], s),
+            };
             let before = || shape.collider.distance(&start_shape_pose[k], at(start), None);
             let side = shape.collider.has_sides().then(|| before().normal);
             let now = shape.collider.distance(&state.shape_pose[k], at(x), side);
+            if look < 3 {
+                found[look] = Some(now);
+            }
             let gap = (now.value - r) / (2.0 * r);
             clearance.shape = Some(clearance.shape.map_or(gap, |c| c.min(gap)));
             if gap < -params::OVERLAP && params::overlaps((before().value - r) / (2.0 * r), gap) {
@@ -233,7 +251,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
                 }
             }
         }
-        last = Some((*slot, e + 1));
+        last = found[2].map(|end| ((*slot, e + 1), end));
     }
     Ok(clearance)
 }

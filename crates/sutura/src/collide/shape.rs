@@ -75,6 +75,20 @@ impl Collider {
         matches!(self, Collider::Surface(_))
     }
 
+    /// The same where the distances at the ends and in the middle are known: none where these say that it comes nowhere as near as `below`.
+    pub fn nearest_between(&self, known: [Distance; 3], pose: &Pose, [a, b]: [DVec3; 2], along: DVec3, below: f64) -> Option<f64> {
+        // A distance grows no faster than the way.
+        let least = known.iter().map(|d| d.value).fold(f64::INFINITY, f64::min) - 0.25 * along.length();
+        if least >= below {
+            return None;
+        }
+        let [first, middle, last] = known.map(|d| (d.value, d.normal.dot(along)));
+        if !self.has_sides() && least_by_tangents(first, middle, 0.5).min(least_by_tangents(middle, last, 0.5)) >= below {
+            return None;
+        }
+        self.nearest_on_segment(pose, a, b, below)
+    }
+
     /// Place in [0, 1] on the segment where its distance is least, where that is less than `below`. Distance to a convex set is convex along a
     /// segment, so tangents bound it and a golden-section search finds it; for a surface it is a local minimum near the better end.
     pub fn nearest_on_segment(&self, pose: &Pose, a: DVec3, b: DVec3, below: f64) -> Option<f64> {

@@ -7,8 +7,9 @@ pub(crate) mod lanes;
 pub(crate) mod strain;
 pub(crate) mod torque;
 
+use crate::model::grip::Hold;
 use crate::model::{Model, rod::RodModel};
-use crate::state::State;
+use crate::state::{GripState, State};
 use crate::view::Energy;
 use glam::DVec3;
 
@@ -80,8 +81,17 @@ pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
             k.z = 0.0;
         }
         sum.stretch += 0.5 * (k * c).dot(c);
-        if model.is_joint(e) && model.weld_of[e].is_none() {
+        if model.is_joint(e) && model.weld_of[e].is_none() && clamps(model, state, rod).all(|(i, _)| i != e) {
             add_joint(&mut sum, joint_angle(model, state, e), model.bend_stiffness[e]);
+        }
+    }
+    // A clamp holds half a joint on each side.
+    for (i, grip) in clamps(model, state, rod).filter(|(i, _)| model.weld_of[*i].is_none()) {
+        let held = grip.pose.orientation;
+        for (e, first) in [(i.wrapping_sub(1), false), (i, true)].into_iter().filter(|(e, _)| rod.elements().contains(e)) {
+            let (a, b) = if first { (held, state.orientation[e]) } else { (state.orientation[e], held) };
+            let angle = strain::joint_angle(a, b, grip.rest_half);
+            add_joint(&mut sum, angle, model.section[e].bend / (0.5 * model.rest_length[e]));
         }
     }
     // Each weld once, also where it joins the rod to itself.
@@ -92,6 +102,13 @@ pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
         }
     }
     sum
+}
+
+/// The clamps of a rod, with the particle that each holds.
+fn clamps<'a>(model: &'a Model, state: &'a State, rod: &'a RodModel) -> impl Iterator<Item = (usize, &'a GripState)> {
+    let slot = model.rod_of[rod.first as usize];
+    let own = state.grips.iter().filter(move |(_, g)| g.rod == slot && g.hold == Hold::Clamp);
+    own.map(|(_, g)| ((rod.first + g.index) as usize, g))
 }
 
 fn add_joint(sum: &mut Energy, angle: DVec3, stiffness: DVec3) {

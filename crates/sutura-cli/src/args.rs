@@ -250,7 +250,7 @@ is compared with its reference: the error, and the order at which it falls. The 
   validation/*.svg         plots against theory
   validation/results.json  the same numbers in full, also as results.csv
 
-The numbers do not depend on --jobs. All cases take about a minute.
+The numbers do not depend on --jobs. All cases take about two minutes.
 
 Examples:
   sutura validate                   everything, to out/validation.md

@@ -210,7 +210,7 @@ pub struct Presets {
 /// Measure the speed of this build on this machine.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied. \
+A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied and a plectoneme is wound. \
 Times are CPU times of the solver on one core; the median of a frame is the number to compare. Build with --release.
 
 Examples:
@@ -256,7 +256,7 @@ is compared with its reference: the error, and the order at which it falls. The 
   validation/*.svg         plots against theory
   validation/results.json  the same numbers in full, also as results.csv
 
-The numbers do not depend on --jobs. All cases take about a minute.
+The numbers do not depend on --jobs. All cases take about two minutes.
 
 Examples:
   sutura validate                   everything, to out/validation.md

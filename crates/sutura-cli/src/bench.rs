@@ -88,7 +88,7 @@ pub fn bench(args: &Bench) -> anyhow::Result<()> {
     }
     if !args.free {
         let rod_ns = measured.free_thread.iter().map(|f| f.ns_per_element_iteration).reduce(f64::min);
-        for name in ["overhand", "square_knot"] {
+        for name in ["overhand", "square_knot", "plectoneme"] {
             measured.knots.push(knot(name, rod_ns)?);
         }
     }

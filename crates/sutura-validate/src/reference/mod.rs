@@ -7,6 +7,7 @@ pub mod catenary;
 pub mod curves;
 pub mod elastica;
 pub mod kirchhoff;
+pub mod knots;
 pub mod links;
 pub mod material;
 mod numeric;

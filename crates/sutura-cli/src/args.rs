@@ -142,8 +142,13 @@ over), or the trajectory of a run.
 An open thread is no knot until its ends are joined. `--ends held` joins them far away along rays outward from the ends, as when two \
 instruments hold them; `--ends free` tries 24 random closures, trims the tails, and calls the knot unknown when under 90 % agree.
 
+The name is topology, which a flat knot keeps when it capsizes into half hitches. Where the diameter is known and the knot has a loop, \
+the line `form` says how it lies: flat when both strands turn alike (one at most 1.5 times as much as the other), capsized when one goes nearly straight through \
+(a third of the other's turning, or less).
+
 Examples:
   sutura knot thread.csv
+  sutura knot thread.csv --diameter 0.225
   sutura knot ring.csv --closed --json
   sutura knot out/square_knot/trajectory.sutura --time 4.5 --ends held
   sutura knot thread.csv --expect square
@@ -167,6 +172,9 @@ pub struct Knot {
     /// Thread of a trajectory, by name [default: the first]
     #[arg(long, value_name = "NAME")]
     pub thread: Option<String>,
+    /// Diameter of the thread in the unit of the points, to tell a flat knot from a capsized one [default: that of the trajectory]
+    #[arg(long, value_name = "D", value_parser = positive)]
+    pub diameter: Option<f64>,
     /// Seed of the random views and closures
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
@@ -292,6 +300,10 @@ fn setting(text: &str) -> Result<(String, String), String> {
 
 fn time(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|t: &f64| t.is_finite() && *t >= 0.0).ok_or_else(|| "wanted a time >= 0 in seconds".into())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|v: &f64| v.is_finite() && *v > 0.0).ok_or_else(|| "wanted a number > 0".into())
 }
 
 fn size(text: &str) -> Result<(u32, u32), String> {

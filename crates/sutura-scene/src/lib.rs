@@ -26,8 +26,8 @@ mod watch;
 
 pub use error::{Problem, SceneError};
 pub use report::{
-    CheckReport, CheckValue, Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series, SolverReport,
-    ThreadReport, WorkReport,
+    CheckReport, CheckValue, Clearance, FormReport, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series,
+    SolverReport, ThreadReport, WarningReport, WorkReport,
 };
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};

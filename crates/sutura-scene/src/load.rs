@@ -12,7 +12,7 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, Moment, Mover, Phase, ProbeDef, ProfileDef, Scene, ShapeDef, Span, Step, Take, ThreadDef, Wanted,
+    Action, Camera, CheckDef, End, Late, LoadDef, Moment, Mover, Phase, ProbeDef, ProfileDef, Scene, ShapeDef, Span, Step, Strength, Take, ThreadDef, Wanted,
     engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};

@@ -8,4 +8,6 @@ pub mod map;
 pub mod overhand;
 pub mod run;
 pub mod session;
+pub mod strength;
 pub mod table;
+pub mod tie;

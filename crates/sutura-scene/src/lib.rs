@@ -33,3 +33,4 @@ pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
 pub use scene::{Camera, Scene};
 pub use trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory, TrajectoryError};
+pub use units::in_si;

@@ -415,6 +415,39 @@ mod tests {
         }
     }
 
+    /// A short way into the draw, to the last bit.
+    #[test]
+    fn results_do_not_depend_on_the_number_of_threads() {
+        let preset = sutura_scene::presets::find_material("silk").unwrap();
+        let material = Material { bend_scale: preset.bend_scale.value, ..Material::elastic(preset.young_modulus.value, preset.density.value) };
+        let case = |throws: &str, mu: f64| Case {
+            material: material.clone(),
+            diameter: 0.225e-3,
+            strength: 9.41,
+            throws: Throws::parse(throws).unwrap(),
+            mu,
+            pretension: 1.0,
+            slip: 1.0,
+        };
+        let cases = [case("square", 0.2), case("granny", 0.3), case("1x1", 0.1)];
+        let budget = Budget { cpu_s: 1e3, frames: 3 };
+        let results = |threads: usize| {
+            let found = run(&cases, budget, threads, &|_, _| {});
+            let table = table(&cases, &found);
+            let cpu = table.column("cpu_s");
+            let mut rows = table.rows;
+            rows.iter_mut().for_each(|row| row[cpu].clear());
+            rows
+        };
+        let one = results(1);
+        assert_eq!(one, results(2));
+        assert_eq!(one.len(), 3);
+        assert_ne!(one[0].last(), one[1].last(), "each case has its own last state");
+        assert!(one.iter().all(|row| row[3] == "not finished: over 3 frames, at 0.050 s"), "{one:?}");
+        let text = report(&cases, &run(&cases, budget, 2, &|_, _| {}), "Head.", "stem");
+        assert!(text.contains("| 1x1 | 1 | not finished |  |  |") && text.contains("![Force that the loop holds until a tail slips](stem.svg)"), "{text}");
+    }
+
     #[test]
     fn the_tail_that_lost_more_counts() {
         let before = Entries { tail_a: 5.0, loop_ab: None, tail_b: 20.0 };

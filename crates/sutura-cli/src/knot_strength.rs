@@ -107,7 +107,7 @@ fn head(cases: &[Case], args: &KnotStrength) -> String {
     let thread = if args.diameter.is_some() { args.material.clone() } else { format!("{} {}", args.size, args.material) };
     format!(
         "Written by `sutura knot-strength`, version {}. Thread: {thread}, diameter {} mm, modulus {} GPa, bending scale {}, {set}; knot-pull strength {} N \
-         (the tension at which it counts as broken). A tail slips when {slip} diameters of it were drawn in. Forces are those on the loop, which two strands \
+         (the tension at which it counts as broken). A tail slips when {slip} diameters of it were drawn through. Forces are those on the loop, which two strands \
          carry.",
         env!("CARGO_PKG_VERSION"),
         number(1e3 * diameter),

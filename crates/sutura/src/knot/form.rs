@@ -85,7 +85,7 @@ pub fn form_of_two(a: &[DVec3], b: &[DVec3], radius: f64) -> Option<Form> {
 /// the input does not fit together.
 pub fn form_of_strands(strands: [&[DVec3]; 2], radius: f64) -> Option<Form> {
     let finite = strands.iter().all(|s| s.iter().all(|p| p.is_finite()));
-    if !finite || !(radius.is_finite() && radius > 0.0) {
+    if !(finite && radius.is_finite() && radius > 0.0) {
         return None;
     }
     let turning = strands.map(|s| turning(&even(s, radius)));

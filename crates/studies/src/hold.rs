@@ -2,17 +2,15 @@
 //! post load its loop.
 
 use crate::case::{Budget, assignments};
-use crate::curve::{Stack, knot_free};
+use crate::curve::Stack;
 use crate::map;
 use crate::run::{ENDED, NOT_FINISHED, Study};
-use crate::session::{Session, quantile};
+use crate::session::quantile;
 use crate::table::{Table, markdown};
+use crate::tie::{FRAME, Spec, Tied};
 use anyhow::Context as _;
 use std::path::Path;
-use sutura::glam::DVec3;
-use sutura::knot::{Entries, entries};
-use sutura::{Drive, Friction, Geometry, GripSpec, Handle, Hold as Held, Material, Place, Plasticity, Pose, Rod, RodSpec};
-use sutura::{Settings, Shape, ShapeMotion, ShapeSpec, Shear, World};
+use sutura::{Material, Plasticity, Shear};
 use sutura_scene::presets;
 
 /// The study.
@@ -33,31 +31,17 @@ const SIZE: &str = "3-0";
 /// Plastic set and damping as the scene square_knot; unverified. The same set for both materials: a strain of 5.6 % at the surface.
 const SET: Plasticity = Plasticity { yield_curvature: 500.0, yield_twist: 500.0, hardening: 0.02 };
 const BEND_DAMPING: f64 = 0.01;
-/// Friction of thread on the post, as the scene.
-const MU_POST: f64 = 0.15;
 /// Radius of the halves of the post, and length of a tail before the draw \[m\].
 const POST: f64 = 2e-3;
 const TAIL: f64 = 8e-3;
-const POST_HALF_LENGTH: f64 = 0.02;
-/// Speeds at which a tail is drawn and half a post pushed when nothing resists \[m/s\].
-const DRAW_SPEED: f64 = 0.03;
+/// Speed at which half a post is pushed when nothing resists \[m/s\].
 const PUSH_SPEED: f64 = 0.005;
-/// Force on the halves of the post that keeps the loop taut while the tails are drawn, and to which it rises when they are, so that the
-/// first throws get tight too; over the force on the tails.
-const COUNTER: (f64, f64) = (0.25, 1.0);
 /// Load on the loop \[N\].
 const LOAD: f64 = 1.0;
-/// A tail counts as drawn at this part of the force: it rests only in the limit. The scene has the same.
-const DRAWN: f64 = 0.975;
-/// The longest that a draw may take, and how long the phases after it are \[s\].
-const DRAW_LONGEST: f64 = 3.0;
-const TIGHTEN: f64 = 0.3;
-const DRAW_SETTLE: f64 = 0.2;
-const LET_GO: f64 = 0.3;
+/// How long the phases under load are \[s\].
 const RAMP: f64 = 1.0;
 const SETTLE: f64 = 1.0;
 const HOLD: f64 = 3.0;
-const FRAME: f64 = 1.0 / 60.0;
 /// Slip in the hold under which a knot holds \[m\].
 const HOLDS: f64 = 1e-4;
 /// Load from which on the loop counts as taut \[N\].
@@ -67,10 +51,6 @@ const TAUT: f64 = 0.05;
 const FAILED: f64 = 5e-3;
 /// Growth of a loop that never was taut at which it has failed too: more than it was slack.
 const FAILED_SLACK: f64 = 8e-3;
-/// Surfaces.
-const THREAD_SURFACE: u32 = 0;
-const POST_SURFACE: u32 = 1;
-
 /// A case: indices into the lists above, and numbers. What is not a factor of the study has a default.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Case {
@@ -88,14 +68,6 @@ impl Default for Case {
     fn default() -> Self {
         Case { thread: 1, knot: 0, mu: 0.3, draw: 1.0, element: 1.0, substep: 1.0 / 240.0 }
     }
-}
-
-/// The world of a case.
-struct Tied {
-    world: World,
-    rod: Handle<Rod>,
-    /// Left and right half.
-    posts: [Handle<Shape>; 2],
 }
 
 impl Case {
@@ -118,8 +90,7 @@ impl Case {
         Ok(case)
     }
 
-    fn tied(&self) -> Result<Tied, String> {
-        let text = |e: sutura::Error| e.to_string();
+    fn spec(&self) -> Result<Spec, String> {
         let (_, material, set) = THREADS[self.thread];
         let preset = presets::find_material(material).map_err(|e| e.to_string())?;
         let diameter = presets::find_size(SIZE).map_err(|e| e.to_string())?.diameter.value;
@@ -131,17 +102,8 @@ impl Case {
             bend_damping: BEND_DAMPING,
             plasticity: set.then_some(SET),
         };
-        let settings = Settings { gravity: DVec3::ZERO, substep: self.substep, linear_damping: 0.9, angular_damping: 0.9, ..Settings::default() };
-        let mut world = World::new(settings).map_err(text)?;
-        world.set_friction(THREAD_SURFACE, THREAD_SURFACE, Friction::coulomb(self.mu)).map_err(text)?;
-        world.set_friction(THREAD_SURFACE, POST_SURFACE, Friction::coulomb(MU_POST)).map_err(text)?;
         let stack = Stack { diameter, post: POST, throws: KNOTS[self.knot].1.to_vec(), tail: TAIL };
-        let spec = RodSpec { surface: THREAD_SURFACE, ..RodSpec::new(stack.centerline(self.element * diameter), 0.5 * diameter, material) };
-        let rod = world.insert_rod(&spec).map_err(text)?;
-        let post =
-            ShapeSpec { surface: POST_SURFACE, ..ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: POST_HALF_LENGTH }, Pose::at(DVec3::ZERO)) };
-        let posts = [world.insert_shape(&post).map_err(text)?, world.insert_shape(&post).map_err(text)?];
-        Ok(Tied { world, rod, posts })
+        Ok(Spec { material, stack, mu: self.mu, element: self.element, substep: self.substep })
     }
 }
 
@@ -150,10 +112,8 @@ impl Case {
 struct Found {
     /// How it ended.
     ended: String,
-    /// Knots before the draw, after it, after it was let go, and at the end.
-    knots: [String; 4],
-    /// Force that both tails reached \[N\].
-    drawn: f64,
+    /// Knots before the draw, after it, and after it was let go.
+    knots: [String; 3],
     /// Force on the loop after the tails were let go, and the largest after that \[N\].
     residual: f64,
     peak: f64,
@@ -165,118 +125,28 @@ struct Found {
 
 /// A case being run.
 struct Bench<'a> {
-    s: Session,
-    rod: Handle<Rod>,
-    posts: [Handle<Shape>; 2],
+    tied: Tied<'a>,
     found: Found,
     /// What `opened` was when the loop was let go, and when it was first taut under the load.
     let_go: f64,
     taut: Option<f64>,
-    trace: &'a mut dyn FnMut(String),
 }
 
 impl Bench<'_> {
-    fn knot(&self) -> Result<String, String> {
-        Ok(knot_free(self.s.world.rod(self.rod).map_err(|e| e.to_string())?.positions()).name().to_string())
-    }
-
-    fn entries(&self) -> Option<Entries> {
-        let rod = self.s.world.rod(self.rod).ok()?;
-        entries(rod.positions(), rod.rest_lengths(), rod.radius())
-    }
-
-    /// Outward force of the thread's loop on the halves of the post: the lesser of the two \[N\].
-    fn load(&self) -> f64 {
-        let along = |k: usize, sign: f64| self.s.world.shape_wrench(self.posts[k]).map_or(0.0, |w| sign * w.force.x);
-        along(0, 1.0).min(along(1, -1.0))
-    }
-
-    /// Length of thread in the loop, less a constant: twice the distance of the halves \[m\].
-    fn opened(&self) -> f64 {
-        let x = |k: usize| self.s.world.shape(self.posts[k]).map_or(0.0, |s| s.pose.position.x);
-        2.0 * (x(1) - x(0))
-    }
-
-    fn push(&mut self, force: f64) -> Result<(), String> {
-        for (post, x) in self.posts.into_iter().zip([-1.0, 1.0]) {
-            let motion = ShapeMotion::Pushed { direction: DVec3::X * x, force, speed_limit: PUSH_SPEED };
-            self.s.world.set_shape_motion(post, motion).map_err(|e| e.to_string())?;
-        }
-        Ok(())
-    }
-
-    fn say(&mut self, what: &str) {
-        let s = &self.s;
-        let line = format!(
-            "{:.3} s: {what}, load {:.3} N, loop {:.3} mm longer, {} contacts, {} substeps, {} rejected, {:.0} ms a frame so far",
-            s.world.time(),
-            self.load(),
-            1e3 * self.opened(),
-            s.world.contacts().count(),
-            s.substeps,
-            s.rejected,
-            1e3 * s.solver_s() / s.ms.len().max(1) as f64
-        );
-        (self.trace)(line);
-    }
-
-    /// One frame; now and then says how it goes.
-    fn frame(&mut self, what: &str) -> Result<(), String> {
-        self.s.frame(FRAME)?;
-        if self.s.ms.len().is_multiple_of(20) {
-            self.say(what);
-        }
-        Ok(())
-    }
-
-    /// Draws the tails by force, and lets them go.
-    fn draw(&mut self, force: f64) -> Result<(), String> {
-        let text = |e: sutura::Error| e.to_string();
-        let x = self.s.world.rod(self.rod).map_err(text)?.positions();
-        let outward = [x[0] - x[1], x[x.len() - 1] - x[x.len() - 2]].map(|v| DVec3::X * v.x.signum());
-        let mut grips = Vec::new();
-        for (place, direction) in [Place::Start, Place::End].into_iter().zip(outward) {
-            let drive = Drive::Force { direction, force, speed_limit: DRAW_SPEED };
-            grips.push(self.s.world.insert_grip(&GripSpec { drive, ..GripSpec::at_once(self.rod, place, Held::Pin) }).map_err(text)?);
-        }
-        self.push(COUNTER.0 * force)?;
-        let pull = |s: &Session, k: usize| s.world.grip_wrench(grips[k]).map(|w| w.force.dot(outward[k])).map_err(text);
-        while self.found.drawn < DRAWN * force {
-            if self.s.world.time() > DRAW_LONGEST {
-                return Err(format!("the tails were not drawn to the force in {DRAW_LONGEST} s"));
-            }
-            self.frame("drawing")?;
-            self.found.drawn = pull(&self.s, 0)?.min(pull(&self.s, 1)?);
-        }
-        for k in 1..=((TIGHTEN + DRAW_SETTLE) / FRAME).round() as u32 {
-            let part = (f64::from(k) * FRAME / TIGHTEN).min(1.0);
-            self.push((COUNTER.0 + (COUNTER.1 - COUNTER.0) * part) * force)?;
-            self.frame("tightening")?;
-        }
-        self.found.knots[1] = self.knot()?;
-        for grip in grips {
-            self.s.world.remove_grip(grip).map_err(text)?;
-        }
-        for post in self.posts {
-            self.s.world.set_shape_motion(post, ShapeMotion::Fixed).map_err(text)?;
-        }
-        Ok(())
-    }
-
     /// Frames for this time. What made the knot fail, if it did.
     fn loaded(&mut self, what: &str, duration: f64, force: &dyn Fn(f64) -> f64) -> Result<Option<String>, String> {
         let frames = (duration / FRAME).round() as u32;
         for k in 1..=frames {
-            self.push(force(f64::from(k) / f64::from(frames)))?;
-            self.frame(what)?;
-            let load = self.load();
+            self.tied.push(force(f64::from(k) / f64::from(frames)), PUSH_SPEED)?;
+            self.tied.frame(what)?;
+            let load = self.tied.load();
             self.found.peak = self.found.peak.max(load);
-            let opened = self.opened();
+            let opened = self.tied.opened();
             if load >= TAUT {
                 self.taut.get_or_insert(opened);
             }
             self.found.growth = opened - self.taut.unwrap_or(self.let_go);
-            if self.entries().is_none() {
+            if self.tied.entries().is_none() {
                 return Ok(Some(format!("opens at {:.2} N", self.found.peak)));
             }
             if self.found.growth > if self.taut.is_some() { FAILED } else { FAILED_SLACK } {
@@ -288,37 +158,34 @@ impl Bench<'_> {
 
     /// The case to its end: how it ended.
     fn run(&mut self, case: &Case) -> Result<String, String> {
-        self.found.knots[0] = self.knot()?;
-        self.draw(case.draw)?;
-        self.say("let go");
-        for _ in 0..(LET_GO / FRAME).round() as u32 {
-            self.frame("let go")?;
-        }
-        self.found.knots[2] = self.knot()?;
-        if self.entries().is_none() || self.found.knots[2] != self.found.knots[0] {
+        self.found.knots[0] = self.tied.knot()?;
+        self.found.knots[1] = self.tied.draw(case.draw)?;
+        self.tied.rest()?;
+        self.found.knots[2] = self.tied.knot()?;
+        if self.tied.entries().is_none() || self.found.knots[2] != self.found.knots[0] {
             return Ok("opens when let go".into());
         }
-        self.let_go = self.opened();
+        self.let_go = self.tied.opened();
         // The loop presses the halves together already; from that force to the load.
-        self.found.residual = self.load();
+        self.found.residual = self.tied.load();
         let from = self.found.residual.clamp(0.0, LOAD);
         for (what, duration, force) in [("loading", RAMP, &(|part| from + (LOAD - from) * part) as &dyn Fn(f64) -> f64), ("settling", SETTLE, &|_| LOAD)] {
             if let Some(failed) = self.loaded(what, duration, force)? {
                 return Ok(failed);
             }
         }
-        let (marked, opened) = (self.entries(), self.opened());
+        let (marked, opened) = (self.tied.entries(), self.tied.opened());
         if let Some(failed) = self.loaded("holding", HOLD, &|_| LOAD)? {
             return Ok(failed);
         }
-        let slip = marked.and_then(|marked| Some(self.entries()?.slip_since(&marked)));
-        (self.found.slip_hold, self.found.growth_hold) = (slip, Some(self.opened() - opened));
+        let slip = marked.and_then(|marked| Some(self.tied.entries()?.slip_since(&marked)));
+        (self.found.slip_hold, self.found.growth_hold) = (slip, Some(self.tied.opened() - opened));
         Ok(if slip.is_some_and(|slip| slip < HOLDS) { "holds".into() } else { format!("slips at {:.2} N", self.found.peak) })
     }
 }
 
 fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<String> {
-    let Tied { world, rod, posts } = match case.tied() {
+    let tied = match case.spec().and_then(|spec| Tied::new(&spec, budget, trace)) {
         Ok(tied) => tied,
         Err(why) => {
             let mut row = vec![String::new(); Hold::MEASURES.len()];
@@ -326,21 +193,22 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
             return row;
         }
     };
-    let mut bench = Bench { s: Session::new(world, budget), rod, posts, found: Found::default(), let_go: 0.0, taut: None, trace };
+    let mut bench = Bench { tied, found: Found::default(), let_go: 0.0, taut: None };
     let ended = bench.run(case);
     bench.found.ended = ended.unwrap_or_else(|why| {
         let f = &bench.found;
         let phase = match () {
-            () if f.knots[1].is_empty() => format!("drawing, {:.2} N", f.drawn),
+            () if f.knots[1].is_empty() => format!("drawing, {:.2} N", bench.tied.drawn),
             () if f.knots[2].is_empty() => "let go".into(),
             () => format!("loading, {:.2} N, loop {:.3} mm longer", f.peak, 1e3 * f.growth),
         };
-        format!("{NOT_FINISHED}{why}, at {:.3} s, {phase}", bench.s.world.time())
+        format!("{NOT_FINISHED}{why}, at {:.3} s, {phase}", bench.tied.s.world.time())
     });
-    bench.found.knots[3] = bench.knot().unwrap_or_default();
-    bench.say("end");
-    let Bench { s, found, trace, .. } = bench;
-    let [before, drawn, free, end] = found.knots;
+    let Bench { mut tied, found, .. } = bench;
+    tied.say("end");
+    let [before, drawn, free] = found.knots;
+    let end = tied.knot().unwrap_or_default();
+    let s = &tied.s;
     let (passes, _) = s.passes(f64::INFINITY);
     let row = vec![
         found.ended,
@@ -349,7 +217,7 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
         found.growth_hold.map(|v| format!("{:.5}", 1e3 * v)).unwrap_or_default(),
         format!("{:.4}", 1e3 * found.growth),
         format!("{:.3}", found.residual),
-        format!("{:.3}", found.drawn),
+        format!("{:.3}", tied.drawn),
         before,
         drawn,
         free,
@@ -367,7 +235,7 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
         format!("{:.2}", s.solver_s()),
         format!("{:016x}", s.world.state_hash()),
     ];
-    trace(Hold::MEASURES.iter().zip(&row).map(|(m, v)| format!("{m} {v}")).collect::<Vec<_>>().join("; "));
+    tied.tell(Hold::MEASURES.iter().zip(&row).map(|(m, v)| format!("{m} {v}")).collect::<Vec<_>>().join("; "));
     row
 }
 
@@ -483,9 +351,9 @@ mod tests {
         all.dedup();
         assert_eq!(all.len(), Hold::cases().len());
         for (knot, want) in ["square", "granny-right", "surgeon-square-right", "square-and-throw-right"].into_iter().enumerate() {
-            let tied = Case { knot, ..Case::default() }.tied().unwrap();
-            let rod = tied.world.rod(tied.rod).unwrap();
-            assert_eq!(knot_free(rod.positions()).name(), want);
+            let spec = Case { knot, ..Case::default() }.spec().unwrap();
+            let tied = Tied::new(&spec, Budget { cpu_s: 1e3, frames: 1 }, &mut |_| {}).map(|t| t.knot());
+            assert_eq!(tied, Ok(Ok(want.to_string())));
         }
     }
 

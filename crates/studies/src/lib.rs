@@ -9,4 +9,6 @@ pub mod overhand;
 pub mod robustness;
 pub mod run;
 pub mod session;
+pub mod strength;
 pub mod table;
+pub mod tie;

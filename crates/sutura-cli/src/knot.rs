@@ -4,7 +4,7 @@ use crate::args::{EndsOption, Knot};
 use crate::{say, say_json};
 use anyhow::{Context as _, bail};
 use sutura::glam::DVec3;
-use sutura::knot::{Ends, KnotType, recognize};
+use sutura::knot::{Ends, Form, KnotType, Verdict, form, recognize};
 use sutura_scene::{Trajectory, points_from_table};
 
 /// What is printed as JSON.
@@ -27,7 +27,27 @@ struct Answer<'a> {
     closures_agreed: u32,
     closures: u32,
     trimmed: f64,
+    form: Option<Lies>,
     problem: Option<String>,
+}
+
+/// How the knot lies.
+#[derive(serde::Serialize)]
+struct Lies {
+    verdict: &'static str,
+    straight: Option<&'static str>,
+    share: f64,
+    turning_rad: [f64; 2],
+}
+
+impl From<Form> for Lies {
+    fn from(form: Form) -> Self {
+        let straight = match form.verdict {
+            Verdict::Capsized { straight } => Some(if straight == 0 { "start" } else { "end" }),
+            Verdict::Flat | Verdict::Unclear => None,
+        };
+        Lies { verdict: form.verdict.name(), straight, share: form.share, turning_rad: form.turning }
+    }
 }
 
 /// Runs the command; false when the knot is not the one expected.
@@ -65,6 +85,7 @@ pub fn knot(args: &Knot) -> anyhow::Result<bool> {
         closures_agreed: found.closures_agreed,
         closures: found.closures_total,
         trimmed: found.trimmed,
+        form: curve.radius.and_then(|radius| form_of(&curve.points, radius)).map(Lies::from),
         problem: found.problem.map(|p| format!("{p:?}")),
     };
     if args.json {
@@ -93,14 +114,30 @@ fn words(a: &Answer<'_>) -> String {
     line("crossings", format!("{} after simplification", a.crossings));
     let trimmed = if a.trimmed > 0.0 { format!(", {:.0} % trimmed from each end", 100.0 * a.trimmed) } else { String::new() };
     line("agreement", format!("{} of {} views, {} of {} closures{trimmed}", a.views_agreed, a.views, a.closures_agreed, a.closures));
+    if let Some(form) = &a.form {
+        let straight = form.straight.map_or_else(String::new, |end| format!(", the strand of the {end} is straight"));
+        let [a, b] = form.turning_rad.map(f64::to_degrees);
+        line("form", format!("{}{straight}; strands turn by {a:.0} and {b:.0} deg, share {:.2}", form.verdict, form.share));
+    }
     if let Some(problem) = &a.problem {
         line("problem", problem.clone());
     }
     out
 }
 
+/// How the knot lies; lengths are those of the pieces, which a recording does not tell from rest lengths.
+fn form_of(points: &[DVec3], radius: f64) -> Option<Form> {
+    // A point given twice is an element without length.
+    let mut points = points.to_vec();
+    points.dedup();
+    let lengths: Vec<f64> = points.windows(2).map(|w| w[0].distance(w[1])).collect();
+    form(&points, &lengths, radius)
+}
+
 struct Curve {
     points: Vec<DVec3>,
+    /// Radius of the thread, in the unit of the points.
+    radius: Option<f64>,
     time: Option<f64>,
     thread: Option<String>,
 }
@@ -112,7 +149,12 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
         if args.frame.is_some() || args.time.is_some() || args.thread.is_some() {
             bail!("{}: not a trajectory, so --frame, --time and --thread mean nothing", file.display());
         }
-        return Ok(Curve { points: points_from_table(&bytes).with_context(|| file.display().to_string())?, time: None, thread: None });
+        return Ok(Curve {
+            points: points_from_table(&bytes).with_context(|| file.display().to_string())?,
+            radius: args.diameter.map(|d| 0.5 * d),
+            time: None,
+            thread: None,
+        });
     }
     let trajectory = Trajectory::from_bytes(&bytes).with_context(|| file.display().to_string())?;
     let count = trajectory.frames.len();
@@ -135,6 +177,7 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
     let points = frame.positions.get(k).with_context(|| format!("{}: no threads", file.display()))?;
     Ok(Curve {
         points: points.iter().map(|p| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))).collect(),
+        radius: args.diameter.map(|d| 0.5 * d).or(threads.get(k).map(|t| t.radius)),
         time: Some(frame.time),
         thread: threads.get(k).map(|t| t.name.clone()),
     })

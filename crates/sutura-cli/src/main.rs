@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod knot;
+mod knot_strength;
 mod plot;
 mod presets;
 mod replay;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
         Some(Command::Run(a)) => run::run(&a),
         Some(Command::Scenes(a)) => scenes::scenes(&a).map(|()| true),
         Some(Command::Knot(a)) => knot::knot(&a),
+        Some(Command::KnotStrength(a)) => knot_strength::knot_strength(&a).map(|()| true),
         Some(Command::Presets(a)) => presets::presets(&a).map(|()| true),
         Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
         Some(Command::Validate(a)) => validate::validate(&a),

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{Geometry, Pose};
-use sutura_scene::{Frame, Header, Outcome, Report, Runner, Scene, Series, ShapeOutline};
+use sutura_scene::{Frame, Header, KnotReport, Outcome, Report, Runner, Scene, Series, ShapeOutline};
 
 impl Run {
     /// A built-in scene with everything left at its default.
@@ -61,10 +61,14 @@ pub fn simulate(mut runner: Runner, quiet: bool) -> Outcome {
     if let Ok(style) = ProgressStyle::with_template("{bar:30.blue/white} {percent:>3} %  {msg}") {
         bar.set_style(style.progress_chars("━━─"));
     }
-    let (mut solver_ms, mut drawn) = (0.0, Instant::now());
+    let (mut solver_ms, mut drawn, mut warned) = (0.0, Instant::now(), 0);
     loop {
         let p = runner.step_frame();
         solver_ms += p.ms;
+        for warning in &runner.warnings()[warned..] {
+            bar.println(format!("warning at {:.4} s: {}", warning.time_s, warning.message));
+            warned += 1;
+        }
         if p.finished {
             break;
         }
@@ -294,7 +298,10 @@ fn summary(r: &Report) -> String {
 
     let mut threads = table(&["thread", "elements", "length [mm]", "radius [mm]", "max elongation", "max tension [N]", "knot"], &[1, 2, 3, 4, 5]);
     for t in &r.threads {
-        let knot = t.knot.as_ref().map_or_else(|| "-".into(), |k| format!("{} (det {}, sig {}, {}/{})", k.name, k.determinant, k.signature, k.agreed, k.tried));
+        let knot = t
+            .knot
+            .as_ref()
+            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.name, form(k), k.determinant, k.signature, k.agreed, k.tried));
         threads.add_row([
             t.name.clone(),
             t.elements.to_string(),
@@ -310,7 +317,7 @@ fn summary(r: &Report) -> String {
     }
     let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
     for p in &r.phases {
-        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}", k.name)).collect();
+        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.name, form(k))).collect();
         phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
     }
     if !r.phases.is_empty() {
@@ -330,6 +337,9 @@ fn summary(r: &Report) -> String {
     }
     if !r.checks.is_empty() {
         out.push_str(&format!("{checks}\n\n"));
+    }
+    for w in &r.warnings {
+        out.push_str(&format!("warning at {:.4} s: {}\n", w.time_s, w.message));
     }
     for i in &r.incidents {
         let last = if i.count > 1 { format!(" to {:.4} s, {} times", i.last_s, i.count) } else { String::new() };
@@ -351,6 +361,11 @@ fn summary(r: &Report) -> String {
     out.push_str(&verdict);
     out.push('\n');
     out
+}
+
+/// How a knot lies, after its name.
+fn form(knot: &KnotReport) -> String {
+    knot.form.as_ref().map_or_else(String::new, |f| format!(", {} ({:.2})", f.verdict, f.share))
 }
 
 /// Five digits after the point, or an exponent where these would not do.

@@ -66,10 +66,10 @@ fn help_teaches() {
     let out = sutura(folder.path(), &["--help"]);
     assert_eq!(out.status.code(), Some(0));
     let help = text(&out.stdout);
-    for word in ["run", "scenes", "knot", "presets", "bench", "Examples:", "Exit codes"] {
+    for word in ["run", "scenes", "knot", "knot-strength", "presets", "bench", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "`{word}` is in the help");
     }
-    for command in ["run", "scenes", "knot", "presets", "bench"] {
+    for command in ["run", "scenes", "knot", "knot-strength", "presets", "bench"] {
         let out = sutura(folder.path(), &[command, "--help"]);
         assert_eq!(out.status.code(), Some(0), "{command}");
         assert!(text(&out.stdout).contains("Examples:"), "{command} --help has examples");
@@ -82,7 +82,7 @@ fn bad_input_ends_with_two_and_says_why() {
     std::fs::write(folder.path().join("bad.toml"), SWING.replace("elements", "elemnts")).unwrap();
     std::fs::write(folder.path().join("bad.csv"), "x,y,z\n0,0,0\n1,0,0\n1,fish,0\n").unwrap();
     // Line 10 of the scene is the misspelled key; line 4 of the table is the one with the fish.
-    let cases: [(&[&str], &[&str]); 8] = [
+    let cases: [(&[&str], &[&str]); 12] = [
         (&["run", "bad.toml"], &["bad.toml:10", "elemnts", "elements"]),
         (&["run", "nowhere/none.toml"], &["nowhere/none.toml"]),
         (&["run", "capstn"], &["capstn", "capstan"]),
@@ -90,6 +90,10 @@ fn bad_input_ends_with_two_and_says_why() {
         (&["knot", "bad.csv"], &["bad.csv:4", "fish"]),
         (&["knot", "none.csv"], &["none.csv"]),
         (&["knot", "bad.csv", "--expect", "sqare"], &["sqare", "square"]),
+        (&["knot-strength", "--throws", "reef"], &["reef", "square", "2=1=1"]),
+        (&["knot-strength", "--size", "11-0"], &["11-0", "--strength"]),
+        (&["knot-strength", "--pretension", "2 mm"], &["2 mm", "force"]),
+        (&["knot-strength", "--diameter", "0.3mm"], &["--strength"]),
         (&["scenes", "show", "capstn"], &["capstan"]),
     ];
     for (args, words) in cases {
@@ -153,6 +157,45 @@ fn a_check_that_fails_ends_with_one() {
     assert_eq!(out.status.code(), Some(1), "{}", text(&out.stderr));
     assert!(text(&out.stdout).contains("FAILED: 1 of 1 checks"));
     assert!(!folder.path().join("out").exists(), "--dry writes nothing");
+}
+
+/// The two ways of one square knot, from the engine's tests.
+#[test]
+fn a_spilled_knot_is_told_from_a_flat_one_where_the_diameter_is_known() {
+    let folder = tempfile::tempdir().unwrap();
+    for (file, verdict, straight) in [("tied_square", "flat", None), ("spilled_square", "capsized", Some("start"))] {
+        let path = polyline(file);
+        let out = sutura(folder.path(), &["knot", &path, "--diameter", "0.225", "--json", "--expect", "square"]);
+        let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert_eq!(out.status.code(), Some(0));
+        assert_eq!((answer["form"]["verdict"].as_str(), answer["form"]["straight"].as_str()), (Some(verdict), straight));
+        assert!(text(&sutura(folder.path(), &["knot", &path, "--diameter", "0.225"]).stdout).contains(verdict));
+        let unknown: serde_json::Value = serde_json::from_slice(&sutura(folder.path(), &["knot", &path, "--json"]).stdout).unwrap();
+        assert!(unknown["form"].is_null(), "without a diameter nothing touches");
+    }
+}
+
+/// Cases are listed; a case over its budget is in the table as such, with files and plots beside it.
+#[test]
+fn the_strength_of_knots_is_tabled() {
+    let folder = tempfile::tempdir().unwrap();
+    let listed = sutura(folder.path(), &["knot-strength", "--throws", "square,2x1", "--mu", "0.1,0.3", "--pretension", "1N,2N", "--list"]);
+    let lines = text(&listed.stdout);
+    assert_eq!((listed.status.code(), lines.lines().count()), (Some(0), 8), "{lines}");
+    assert!(lines.contains("2x1, drawn with 2 N, mu 0.3"), "{lines}");
+    assert!(!folder.path().join("out").exists(), "--list writes nothing");
+
+    let out = sutura(folder.path(), &["knot-strength", "--plastic", "--throws", "granny", "--mu", "0.2,0.3", "--budget", "0.000001"]);
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    assert!(text(&out.stdout).contains("not finished"), "{}", text(&out.stdout));
+    let made = folder.path().join("out/knot-strength");
+    let read = |name: &str| std::fs::read_to_string(made.join(name)).unwrap();
+    let table = read("knot_strength.csv");
+    assert_eq!(table.lines().count(), 3, "{table}");
+    assert!(table.lines().skip(1).all(|l| l.starts_with("granny,1,0.") && l.contains("over 0.000001 s of CPU time")), "{table}");
+    let report = read("knot_strength.md");
+    assert!(report.contains("| granny | 1 | not finished | not finished |") && report.contains("knot-pull strength 9.41 N"), "{report}");
+    assert_eq!(read("knot_strength_pulls.csv").lines().count(), 1, "nothing was pulled");
 }
 
 #[test]

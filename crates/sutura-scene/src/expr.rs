@@ -164,6 +164,13 @@ impl Expr {
     pub fn value(&self, live: &dyn Live) -> Value {
         eval::eval(&self.node, live)
     }
+    /// What it reads, where it is one reading and nothing else.
+    pub fn reads(&self) -> Option<Read> {
+        match &self.node {
+            Node::Read(read, _) => Some(*read),
+            _ => None,
+        }
+    }
     /// Whether it holds (expressions of kind truth).
     pub fn holds(&self, live: &dyn Live) -> bool {
         self.value(live) == Value::Truth(true)

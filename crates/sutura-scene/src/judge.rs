@@ -1,6 +1,6 @@
 //! The only place that asks the engine's audit and knot recognition.
 
-use crate::report::KnotReport;
+use crate::report::{FormReport, KnotReport};
 use sutura::audit::{Audit, Pair};
 use sutura::glam::DVec3;
 use sutura::knot::{self, Ends, Entries};
@@ -73,7 +73,20 @@ pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
     } else {
         (recognition.projections_total, recognition.projections_agreed)
     };
-    KnotReport { name: recognition.knot.name().into(), determinant: recognition.determinant, signature: i64::from(recognition.signature), tried, agreed }
+    KnotReport {
+        name: recognition.knot.name().into(),
+        determinant: recognition.determinant,
+        signature: i64::from(recognition.signature),
+        tried,
+        agreed,
+        form: form(rod),
+    }
+}
+
+/// How the knot of a thread lies.
+fn form(rod: &RodView<'_>) -> Option<FormReport> {
+    let form = knot::form(rod.positions(), rod.rest_lengths(), rod.radius())?;
+    Some(FormReport { verdict: form.verdict.name().into(), share: form.share, turning_rad: form.turning })
 }
 
 /// How far the ends are extended for the writhe, in lengths of the thread. What joins them there counts for about 1 / this.
@@ -92,6 +105,12 @@ pub fn writhe(rod: &RodView<'_>) -> f64 {
     extended.extend_from_slice(points);
     extended.push(tail(points[n - 2], points[n - 1]));
     knot::writhe(&extended, false)
+}
+
+/// Mean tension of a thread between the inner entries of its knot \[N\].
+pub fn loop_tension(rod: &RodView<'_>) -> Option<f64> {
+    let [from, to] = entries(rod)?.loop_ab?;
+    rod.mean_tension(from, to)
 }
 
 /// Where a thread enters its knot.

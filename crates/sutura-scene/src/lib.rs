@@ -27,11 +27,12 @@ mod watch;
 
 pub use error::{Problem, SceneError};
 pub use report::{
-    CheckReport, CheckValue, Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series, SolverReport,
-    ThreadReport, WorkReport,
+    CheckReport, CheckValue, Clearance, FormReport, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series,
+    SolverReport, ThreadReport, WarningReport, WorkReport,
 };
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
 pub use scene::{Camera, Scene};
 pub use table::{TableError, points_from_table};
 pub use trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory, TrajectoryError};
+pub use units::in_si;

@@ -12,8 +12,8 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Take,
-    ThreadDef, Wanted, WeldDef, engine_place,
+    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Strength,
+    Take, ThreadDef, Wanted, WeldDef, engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};
 use std::path::{Path, PathBuf};

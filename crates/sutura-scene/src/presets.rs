@@ -37,6 +37,8 @@ pub struct MaterialPreset {
     pub name: &'static str,
     /// What it is.
     pub title: &'static str,
+    /// Which limit of knot-pull strength its threads must meet; `None` where neither is for it.
+    pub absorbable: Option<bool>,
     /// Young's modulus in tension.
     pub young_modulus: Figure,
     /// Poisson's ratio.
@@ -111,6 +113,14 @@ pub fn find_material(name: &str) -> Result<&'static MaterialPreset, UnknownPrese
     })
 }
 
+/// The least knot-pull strength of a thread of this size: of the kind of its material, and of the weaker kind where the material is not
+/// known. `None` where there is no limit.
+pub fn knot_pull(size: &Size, material: Option<&MaterialPreset>) -> Option<Figure> {
+    let kinds = [(true, size.knot_pull_absorbable), (false, size.knot_pull_nonabsorbable)];
+    let fits = |absorbable: bool| material.is_none_or(|m| m.absorbable == Some(absorbable));
+    kinds.into_iter().filter(|k| fits(k.0)).filter_map(|k| k.1).min_by(|a, b| a.value.total_cmp(&b.value))
+}
+
 /// Where the ranges of diameter come from.
 const RANGES: &str = "lower bounds: metric number / 10 (Ph. Eur.; product catalogues, e.g. 3-0 = 2, 2-0 = 3); upper bounds recalled from the USP monographs, not read again; the middle of the range is used";
 /// Where the knot-pull limits come from.
@@ -171,10 +181,11 @@ const MONO_FRICTION: &str = "engineering start value, 0.12 to 0.25 for monofilam
 const BRAID_FRICTION: &str = "engineering start value, 0.2 to 0.35 for braids; falls with load; no source gives a number";
 const POISSON: &str = "assumed for polymers, not verified";
 
-const fn monofilament(name: &'static str, title: &'static str, young_modulus: Figure, density: f64) -> MaterialPreset {
+const fn monofilament(name: &'static str, title: &'static str, absorbable: bool, young_modulus: Figure, density: f64) -> MaterialPreset {
     MaterialPreset {
         name,
         title,
+        absorbable: Some(absorbable),
         young_modulus,
         poisson_ratio: unverified(0.4, "", POISSON),
         density: unverified(density, "kg/m^3", TEXTBOOK),
@@ -184,23 +195,31 @@ const fn monofilament(name: &'static str, title: &'static str, young_modulus: Fi
     }
 }
 
-const fn braid(name: &'static str, title: &'static str, young_modulus: Figure, density: f64) -> MaterialPreset {
+const fn braid(name: &'static str, title: &'static str, absorbable: bool, young_modulus: Figure, density: f64) -> MaterialPreset {
     MaterialPreset {
         bend_scale: unverified(0.02, "", BRAID_BENDING),
         friction: unverified(0.3, "", BRAID_FRICTION),
-        ..monofilament(name, title, young_modulus, density)
+        ..monofilament(name, title, absorbable, young_modulus, density)
     }
 }
 
 const MATERIALS: &[MaterialPreset] = &[
-    braid("silk", "braided silk", read(8.7e9, "Pa", NALEWAY), 1300.0),
-    braid("polyglactin", "braided polyglactin 910 (the modulus is that of the rapid grade)", read(9.32e9, "Pa", NALEWAY), 1500.0),
-    monofilament("polypropylene", "polypropylene monofilament; takes a plastic set at moderate load (Holmlund 1976)", unverified(3.0e9, "Pa", MODULUS), 910.0),
-    monofilament("nylon", "nylon monofilament", unverified(2.2e9, "Pa", MODULUS), 1140.0),
-    monofilament("polydioxanone", "polydioxanone monofilament", unverified(1.5e9, "Pa", MODULUS), 1300.0),
+    braid("silk", "braided silk", false, read(8.7e9, "Pa", NALEWAY), 1300.0),
+    braid("polyglactin", "braided polyglactin 910 (the modulus is that of the rapid grade)", true, read(9.32e9, "Pa", NALEWAY), 1500.0),
+    monofilament(
+        "polypropylene",
+        "polypropylene monofilament; takes a plastic set at moderate load (Holmlund 1976)",
+        false,
+        unverified(3.0e9, "Pa", MODULUS),
+        910.0,
+    ),
+    monofilament("nylon", "nylon monofilament", false, unverified(2.2e9, "Pa", MODULUS), 1140.0),
+    monofilament("polydioxanone", "polydioxanone monofilament", true, unverified(1.5e9, "Pa", MODULUS), 1300.0),
     MaterialPreset {
+        // The limits of class I are not for metal.
+        absorbable: None,
         poisson_ratio: unverified(0.3, "", TEXTBOOK),
-        ..monofilament("steel", "stainless steel wire", unverified(195.0e9, "Pa", TEXTBOOK), 7900.0)
+        ..monofilament("steel", "stainless steel wire", false, unverified(195.0e9, "Pa", TEXTBOOK), 7900.0)
     },
 ];
 
@@ -227,6 +246,15 @@ mod tests {
         assert_eq!(find_size("3-00").unwrap_err().nearest, Some("3-0"));
         assert!(find_material("nilon").unwrap_err().to_string().contains("`nylon`"));
         assert_eq!(find_material("granite").unwrap_err().nearest, None);
+    }
+
+    #[test]
+    fn the_knot_pull_limit_is_that_of_the_kind_of_the_material() {
+        let (size, pull) = (find_size("3-0").unwrap(), |m: &str| knot_pull(find_size("3-0").unwrap(), Some(find_material(m).unwrap())).map(|f| f.value));
+        assert_eq!((pull("silk"), pull("polydioxanone"), pull("steel")), (Some(9.41), Some(17.36), None));
+        assert_eq!(knot_pull(size, None).map(|f| f.value), Some(9.41));
+        assert_eq!(knot_pull(find_size("9-0").unwrap(), None), None);
+        assert_eq!(knot_pull(find_size("5").unwrap(), None).map(|f| f.value), Some(60.41));
     }
 
     #[test]

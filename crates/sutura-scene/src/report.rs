@@ -93,6 +93,9 @@ pub struct Report {
     pub probes: Vec<ProbeReport>,
     /// Each check.
     pub checks: Vec<CheckReport>,
+    /// What a real thread might not have borne; no failure.
+    #[serde(default)]
+    pub warnings: Vec<WarningReport>,
     /// What went wrong.
     pub incidents: Vec<IncidentReport>,
     /// Hash of the last state, 16 hexadecimal digits.
@@ -170,6 +173,39 @@ pub struct KnotReport {
     pub tried: u32,
     /// See `tried`.
     pub agreed: u32,
+    /// How it lies; `None` without a loop, or where the thread does not touch itself.
+    #[serde(default)]
+    pub form: Option<FormReport>,
+}
+
+/// Whether a knot lies flat or has capsized, which its name does not tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FormReport {
+    /// `flat`, `capsized` or `unclear`.
+    pub verdict: String,
+    /// How evenly the two strands share the turning: 1 alike, 0 one of them straight.
+    pub share: f64,
+    /// Total curvature of the strand of the thread's start, and of that of its end \[rad\].
+    pub turning_rad: [f64; 2],
+}
+
+/// A tension that passed the knot-pull strength of its thread: the first time in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WarningReport {
+    /// In words.
+    pub message: String,
+    /// Name of the thread.
+    pub thread: String,
+    /// End of the frame at which it was seen \[s\].
+    pub time_s: f64,
+    /// Arc length from the start of the thread where the tension is greatest \[m\].
+    pub arc_m: f64,
+    /// The tension there \[N\].
+    #[serde(rename = "tension_N")]
+    pub tension_n: f64,
+    /// The strength that it passed \[N\].
+    #[serde(rename = "strength_N")]
+    pub strength_n: f64,
 }
 
 /// Least clearance by kind of pair: (distance - radii) / thread diameter, negative overlaps. `None`: nothing was ever near.

@@ -1,7 +1,9 @@
 //! Steps a scene frame by frame: phases, motions, probes, checks, recording.
 
 use crate::error::SceneError;
-use crate::report::{Clearance, FrameTimes, IncidentReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WorkReport};
+use crate::report::{
+    Clearance, FrameTimes, IncidentReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
+};
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
 use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory};
@@ -33,6 +35,7 @@ pub struct Runner {
     saved: Vec<SavedState>,
     phases: Vec<PhaseReport>,
     incidents: Vec<(IncidentKey, IncidentReport)>,
+    warnings: Vec<WarningReport>,
     work: WorkReport,
     max_elongation: Vec<f64>,
     max_tension: Vec<f64>,
@@ -111,6 +114,7 @@ impl Runner {
             saved: Vec::new(),
             phases: Vec::new(),
             incidents: Vec::new(),
+            warnings: Vec::new(),
             work: WorkReport { converged: true, ..WorkReport::default() },
             max_elongation: vec![0.0; n],
             max_tension: vec![f64::NEG_INFINITY; n],
@@ -137,6 +141,7 @@ impl Runner {
             self.stage.time = self.frame as f64 / self.scene.frame_rate;
             self.stage.moment_passed();
             self.take_note(&report, cpu);
+            self.warn();
             self.look();
             self.stuck = if stuck { self.stuck + 1 } else { 0 };
             if self.stuck >= GIVE_UP {
@@ -259,6 +264,27 @@ impl Runner {
         ]);
     }
 
+    /// Warns of the first tension in each thread past its knot-pull strength.
+    fn warn(&mut self) {
+        for (def, handle) in self.scene.threads.iter().zip(&self.stage.threads) {
+            let (Some(strength), Ok(rod)) = (&def.strength, self.stage.world.rod(*handle)) else { continue };
+            if self.warnings.iter().any(|w| w.thread == def.name) {
+                continue;
+            }
+            let element = (0..rod.n_elements()).max_by(|a, b| rod.tension(*a).total_cmp(&rod.tension(*b)));
+            let Some((element, tension)) = element.map(|j| (j, rod.tension(j))).filter(|e| e.1 > strength.value) else { continue };
+            let (time_s, arc_m) = (self.stage.time, rod.arc(element) + 0.5 * rod.rest_lengths()[element]);
+            let message = format!(
+                "`{}`: the tension passes the knot-pull strength of {} N ({}): {tension:.3} N at {:.2} mm; a thread with a knot may break there, here it does not",
+                def.name,
+                strength.value,
+                strength.of,
+                1e3 * arc_m
+            );
+            self.warnings.push(WarningReport { message, thread: def.name.clone(), time_s, arc_m, tension_n: tension, strength_n: strength.value });
+        }
+    }
+
     /// Reads probes and checks at the present state.
     fn look(&mut self) {
         let time = self.stage.time;
@@ -365,6 +391,10 @@ impl Runner {
         }
     }
 
+    /// The warnings so far.
+    pub fn warnings(&self) -> &[WarningReport] {
+        &self.warnings
+    }
     /// The scene.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -472,6 +502,7 @@ impl Runner {
             probes,
             passed: checks.iter().all(|c| c.passed) && !self.late,
             checks,
+            warnings: self.warnings,
             incidents: self.incidents.into_iter().map(|(_, r)| r).collect(),
             state_hash: format!("{:016x}", self.stage.world.state_hash()),
             work: self.work,

@@ -62,6 +62,17 @@ pub(crate) struct ThreadDef {
     pub location: Location,
     /// Whether the final knot is recognised for the report.
     pub knot: bool,
+    /// Tension past which a run warns, and where it comes from.
+    pub strength: Option<Strength>,
+}
+
+/// Knot-pull strength of a thread.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Strength {
+    /// \[N\].
+    pub value: f64,
+    /// In words.
+    pub of: String,
 }
 
 #[derive(Debug, Clone)]

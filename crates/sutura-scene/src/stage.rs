@@ -449,7 +449,7 @@ impl Stage {
                 let held: Vec<f64> = self.grips.iter().flatten().filter(|h| h.thread == thread).map(|h| arc_of(&rod, h.place)).collect();
                 judge::recognize(&rod, &held, self.seed)
             }
-            None => KnotReport { name: "unknown".into(), determinant: 0, signature: 0, tried: 0, agreed: 0 },
+            None => KnotReport { name: "unknown".into(), determinant: 0, signature: 0, tried: 0, agreed: 0, form: None },
         };
         self.knots.borrow_mut().push((thread, knot.clone()));
         knot
@@ -733,11 +733,14 @@ impl Live for Stage {
             Read::Knot => Value::Text(thread.map_or("unknown".into(), |t| self.knot(t).name)),
             Read::Determinant => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).determinant as f64)),
             Read::Signature => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).signature as f64)),
+            Read::Form => Value::Text(thread.and_then(|t| self.knot(t).form).map_or("none".into(), |f| f.verdict)),
+            Read::TurningShare => Value::Number(thread.and_then(|t| self.knot(t).form).map_or(f64::NAN, |f| f.share)),
             Read::Entries => {
                 let e = thread.and_then(|t| self.rod(t)).and_then(|r| judge::entries(&r));
                 let [a, b] = e.and_then(|e| e.loop_ab).unwrap_or([f64::NAN; 2]);
                 Value::Columns(vec![e.map_or(f64::NAN, |e| e.tail_a), a, b, e.map_or(f64::NAN, |e| e.tail_b)])
             }
+            Read::LoopTension => Value::Number(thread.and_then(|t| judge::loop_tension(&self.rod(t)?)).unwrap_or(f64::NAN)),
             Read::Slip => Value::Number(
                 thread.and_then(|t| Some((self.marks[t]?, judge::entries(&self.rod(t)?)?))).map_or(f64::NAN, |(before, now)| now.slip_since(&before)),
             ),

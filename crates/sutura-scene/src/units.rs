@@ -243,6 +243,14 @@ pub fn number_length(text: &str) -> usize {
     i
 }
 
+/// A quantity typed outside of a scene, in SI. `like` is an SI unit of what is wanted, such as `N`, and is meant where the text has no
+/// unit. The error is a message.
+pub fn in_si(text: &str, like: &str) -> Result<f64, String> {
+    let (quantity, wanted) = (parse_quantity(text)?, parse_unit(like)?);
+    let plain = quantity.dim == Dim::NUMBER && number_length(text.trim()) == text.trim().len();
+    if plain || wanted.dim.accepts(quantity.dim) { Ok(quantity.value) } else { Err(format!("`{text}` is {}, wanted {}", quantity.dim, wanted.dim)) }
+}
+
 /// Reads a number with a unit, such as `0.225 mm`, `8.7 GPa`, `1/4 turn` is not one.
 pub fn parse_quantity(text: &str) -> Result<Quantity, String> {
     let text = text.trim();

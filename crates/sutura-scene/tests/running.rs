@@ -307,3 +307,62 @@ tolerance = "1 %"
     let radii: Vec<f64> = report.threads.iter().map(|t| t.radius_m).collect();
     assert_eq!(radii, [0.5e-3; 3]);
 }
+
+/// 12 N on a thread whose size must bear 9.41 N with a knot: one warning, and nothing fails.
+#[test]
+fn a_tension_past_the_knot_pull_strength_is_warned_of_once() {
+    let scene = |strength: &str| {
+        format!(
+            r#"
+frame_rate = 100
+[solver]
+gravity = [0, 0, 0]
+linear_damping = 0.999
+[[thread]]
+name = "silk"
+size = "3-0"
+material = "silk"
+elements = 10
+line = {{ from = [0, 0, 0], to = "[0, 0, -50] mm" }}
+{strength}
+[[grip]]
+name = "wall"
+at = "start"
+hold = "pin"
+[[load]]
+name = "pull"
+at = "end"
+force = "[0, 0, -12] N"
+[[phase]]
+name = "pulled"
+duration = "0.5 s"
+[[check]]
+that = "tension(silk)"
+between = ["11.9 N", "12.1 N"]
+"#
+        )
+    };
+    let report = run(&scene("")).report;
+    assert!(report.passed && report.incidents.is_empty());
+    let [warning] = &report.warnings[..] else { panic!("{:?}", report.warnings) };
+    assert_eq!((warning.thread.as_str(), warning.strength_n), ("silk", 9.41));
+    assert!(warning.tension_n > 9.41 && warning.time_s < 0.5 && (0.0..0.05).contains(&warning.arc_m), "{warning:?}");
+    assert!(warning.message.contains("USP size 3-0") && warning.message.contains("unverified"), "{}", warning.message);
+    assert_eq!(run(&scene("knot_pull_strength = \"13 N\"")).report.warnings, []);
+    let given = run(&scene("knot_pull_strength = \"5 N\"")).report.warnings;
+    assert_eq!((given.len(), given[0].strength_n), (1, 5.0));
+}
+
+/// A knot has a form only where there is one; the words are checked when the scene is read.
+#[test]
+fn form_and_tension_of_the_loop_can_be_asked_for() {
+    let check = |that: &str, equals: &str| format!("{HANGING}\n[[phase]]\nduration = \"20 ms\"\n[[check]]\nthat = \"{that}\"\n{equals}\n");
+    assert!(run(&check("form(rod)", "equals = \"none\"")).report.passed);
+    assert!(!run(&check("form(rod)", "equals = \"flat\"")).report.passed);
+    assert!(!run(&check("loop_tension(rod)", "at_least = \"0 N\"")).report.passed, "what is not there is no number");
+    assert!(!run(&check("turning_share(rod)", "at_least = 0")).report.passed);
+    let wrong = |that: &str, word: &str| Scene::parse(&check(that, &format!("equals = \"{word}\"")), "test.toml").unwrap_err().to_string();
+    assert!(wrong("form(rod)", "square").contains("no form of a knot is called `square`"));
+    assert!(wrong("form(rod)", "capsised").contains("`capsized`"));
+    assert!(wrong("knot(rod)", "flat").contains("no knot is called `flat`"));
+}

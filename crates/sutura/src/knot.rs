@@ -7,15 +7,18 @@
 //!
 //! Also here: writhe and linking number ([`writhe`], [`gauss_linking`]) and the places where a thread enters its knot ([`entries`]).
 //!
-//! Topology does not tell a flat square knot from one that has capsized into sliding half hitches.
+//! Topology does not tell a flat square knot from one that has capsized into sliding half hitches; [`form`] does, by how the two
+//! strands share the turning.
 
 mod diagram;
 mod entries;
+mod form;
 mod linking;
 mod reduce;
 pub(crate) mod space;
 
 pub use entries::{Entries, entries};
+pub use form::{Form, Verdict, form, form_of_strands, form_of_two};
 pub use linking::{gauss_linking, writhe};
 
 use core::fmt;

@@ -239,6 +239,19 @@ impl<'a> RodView<'a> {
     pub fn max_tension(&self) -> f64 {
         (0..self.n_elements()).map(|j| self.tension(j)).fold(f64::NEG_INFINITY, f64::max)
     }
+    /// Mean tension \[N\] of the thread between two rest arc lengths \[m\]; `None` when none of it lies between them.
+    pub fn mean_tension(&self, from: f64, to: f64) -> Option<f64> {
+        let (mut arc, mut length, mut sum) = (0.0, 0.0, 0.0);
+        for (j, l) in self.rest_lengths().iter().enumerate() {
+            let inside = (to.min(arc + l) - from.max(arc)).max(0.0);
+            if inside > 0.0 {
+                sum += inside * self.tension(j);
+                length += inside;
+            }
+            arc += l;
+        }
+        (length > 0.0).then(|| sum / length)
+    }
     /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is kept). At the seam of a closed
     /// thread the twist at rest does not count, so that it is what was put in before closing.
     pub fn twist(&self) -> f64 {

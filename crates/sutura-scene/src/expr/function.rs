@@ -46,7 +46,10 @@ pub enum Read {
     Knot,
     Determinant,
     Signature,
+    Form,
+    TurningShare,
     Entries,
+    LoopTension,
     Slip,
     PassesThrough,
 }
@@ -175,7 +178,10 @@ pub(super) const FUNCTIONS: &[Function] = &[
     f("knot", Read::Knot, &[Wants::Thread], 1, Gives::Text),
     f("determinant", Read::Determinant, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("signature", Read::Signature, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
+    f("form", Read::Form, &[Wants::Thread], 1, Gives::Text),
+    f("turning_share", Read::TurningShare, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("entries", Read::Entries, &[Wants::Thread], 1, Gives::Columns(ENTRIES)),
+    f("loop_tension", Read::LoopTension, &[Wants::Thread], 1, Gives::Number(Dim::FORCE)),
     f("slip", Read::Slip, &[Wants::Thread], 1, Gives::Number(Dim::LENGTH)),
     f("passes_through", Read::PassesThrough, &[], 0, Gives::Truth),
 ];

@@ -15,6 +15,7 @@ impl<'d> Loader<'d> {
         let stretch = table.get("stretch").and_then(|v| v.choice(&[("elastic", Stretch::Elastic), ("inextensible", Stretch::Inextensible)]));
         let surface = self.surface(table, 0);
         let knot = table.truth_or("knot", false);
+        let strength = strength(table);
         let points = self.centerline(table, None);
         let hint = table.vector("d1", Dim::NUMBER);
         let twist = table.quantity_or("twist", Dim::ANGLE, 0.0);
@@ -30,7 +31,7 @@ impl<'d> Loader<'d> {
                 let _ = self.rest(&rest, 1, closed);
             }
             let spec = RodSpec::straight(DVec3::ZERO, DVec3::X, 1, 1e-3, Material::elastic(1e9, 1e3));
-            self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
+            self.threads.push(ThreadDef { name, spec, location: table.location(), knot, strength });
             return;
         };
         let mut spec = RodSpec { section, roll, pretwist, along: Along { size, modulus, density }, ..RodSpec::new(points, radius, material) };
@@ -51,7 +52,7 @@ impl<'d> Loader<'d> {
         if !closed && (hint.is_some() || twist != 0.0) {
             spec.frames = frames(&spec.centerline, hint, twist);
         }
-        self.threads.push(ThreadDef { name, spec, location: table.location(), knot });
+        self.threads.push(ThreadDef { name, spec, location: table.location(), knot, strength });
     }
 
     /// Section, radius with which it touches, and the size of the section along the thread over its largest.
@@ -476,6 +477,18 @@ fn along_value(value: &Value<'_>, dim: Dim) -> Option<(f64, Profile)> {
     };
     points.iter_mut().for_each(|(_, v)| *v /= largest);
     Some((largest, Profile(points)))
+}
+
+/// Knot-pull strength: as given, or the limit for size and material. (A name that is no preset's is reported where the number is used.)
+fn strength(table: &Table<'_>) -> Option<Strength> {
+    if let Some(value) = positive(table, "knot_pull_strength", Dim::FORCE) {
+        return Some(Strength { value, of: "as given".into() });
+    }
+    let size = presets::find_size(&table.text("size")?).ok()?;
+    let material = table.text("material").and_then(|m| presets::find_material(&m).ok());
+    let limit = presets::knot_pull(size, material)?;
+    let unverified = if limit.verified { "" } else { ", unverified" };
+    Some(Strength { value: limit.value, of: format!("least of USP size {}{unverified}", size.name) })
 }
 
 fn names_of_materials() -> String {

@@ -156,9 +156,12 @@ impl<'d> Loader<'d> {
             Kind::Text => {
                 let v = table.need("equals", "the text wanted")?;
                 let text = v.text()?.into_owned();
-                let names = sutura::knot::KnotType::NAMES;
-                if text != "unknown" && !names.iter().any(|n| texts_match(n, &text)) {
-                    v.problem(format!("no knot is called `{text}`"), suggest(&text, names));
+                let (no_such, names) = match that.reads() {
+                    Some(Read::Form) => ("no form of a knot", [&sutura::knot::Verdict::NAMES[..], &["none"]].concat()),
+                    _ => ("no knot", [&sutura::knot::KnotType::NAMES[..], &["unknown"]].concat()),
+                };
+                if !names.iter().any(|n| texts_match(n, &text)) {
+                    v.problem(format!("{no_such} is called `{text}`"), suggest(&text, names));
                 }
                 return Some((Wanted::Text(text.clone()), text, None));
             }

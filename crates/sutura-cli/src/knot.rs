@@ -5,7 +5,7 @@ use crate::{say, say_json};
 use anyhow::{Context as _, bail};
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, Form, KnotType, Verdict, form, recognize};
-use sutura_scene::{Trajectory, points_from_table};
+use sutura_scene::{TableError, Trajectory, points_from_table};
 
 /// What is printed as JSON.
 #[derive(serde::Serialize)]
@@ -150,7 +150,10 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
             bail!("{}: not a trajectory, so --frame, --time and --thread mean nothing", file.display());
         }
         return Ok(Curve {
-            points: points_from_table(&bytes).with_context(|| file.display().to_string())?,
+            points: points_from_table(&bytes).map_err(|e| match e {
+                TableError::Row { line, reason } => anyhow::anyhow!("{}:{line}: {reason}", file.display()),
+                other => anyhow::anyhow!("{}: {other}", file.display()),
+            })?,
             radius: args.diameter.map(|d| 0.5 * d),
             time: None,
             thread: None,

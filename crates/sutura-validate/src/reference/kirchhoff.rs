@@ -1,4 +1,4 @@
-//! The static Kirchhoff rod in space by shooting: inextensible, unshearable, isotropic, of uniform rest curvature.
+//! The static Kirchhoff rod in space by shooting: inextensible, unshearable, of uniform stiffness and rest curvature about its own directors.
 //!
 //! R = [d1 d2 d3], R' = R hat(u), r' = d3, u = u0 + K^-1 R^T m, n' = 0, m' = -r' x n.
 
@@ -13,8 +13,8 @@ pub struct Cantilever {
     pub frame: [[f64; 3]; 3],
     /// Length.
     pub length: f64,
-    /// Bending and twisting stiffness.
-    pub stiffness: [f64; 2],
+    /// Bending stiffness about d1 and d2, twisting stiffness.
+    pub stiffness: [f64; 3],
     /// Rest curvature about d1 and d2, and rest twist.
     pub rest: [f64; 3],
     /// Force at the end.
@@ -77,8 +77,7 @@ impl Cantilever {
         }
         let y = integrate(&start, s, |_, y, dy| {
             let (d1, d2, d3, m) = (&y[3..6], &y[6..9], &y[9..12], &y[12..15]);
-            let [bend, twist] = self.stiffness;
-            let u = [self.rest[0] + dot(d1, m) / bend, self.rest[1] + dot(d2, m) / bend, self.rest[2] + dot(d3, m) / twist];
+            let u: [f64; 3] = std::array::from_fn(|i| self.rest[i] + dot([d1, d2, d3][i], m) / self.stiffness[i]);
             let push = cross(d3, &self.force);
             for i in 0..3 {
                 dy[i] = d3[i];
@@ -95,7 +94,10 @@ impl Cantilever {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{elastica, material::T1};
+    use super::super::{
+        elastica,
+        material::{SQUARE, T1},
+    };
     use super::*;
 
     #[test]
@@ -104,7 +106,7 @@ mod tests {
             start: [0.0; 3],
             frame: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             length: 1.0,
-            stiffness: [1.0, 0.7],
+            stiffness: [1.0, 1.0, 0.7],
             rest: [0.0; 3],
             force: [0.0, 0.0, -5.0],
             moment: [0.0; 3],
@@ -121,7 +123,7 @@ mod tests {
             start: [0.0; 3],
             frame: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             length: 0.05,
-            stiffness: [T1.ei(), T1.gj()],
+            stiffness: [T1.ei(), T1.ei(), T1.gj()],
             rest: [0.0; 3],
             force: [0.0, -1e-3, 0.0],
             moment: [2e-5, 0.0, 0.0],
@@ -135,10 +137,37 @@ mod tests {
         }
     }
 
-    /// The bend of Bathe and Bolourchi with GJ = EI, in thread size too.
+    /// A section four times as stiff about d1, rolled about the rod, and one that turns by 90 degrees along it.
+    #[test]
+    fn sections_with_two_stiffnesses() {
+        let rod = |roll: f64, twist: f64| {
+            let (sin, cos) = roll.to_radians().sin_cos();
+            Cantilever {
+                start: [0.0; 3],
+                frame: [[0.0, cos, sin], [0.0, -sin, cos], [1.0, 0.0, 0.0]],
+                length: 0.05,
+                stiffness: [4.0 * T1.ei(), T1.ei(), T1.gj()],
+                rest: [0.0, 0.0, twist / 0.05],
+                force: [0.0, -1e-3, 0.0],
+                moment: [0.0; 3],
+            }
+        };
+        for (roll, twist, want) in [
+            (30.0, 0.0, [-12.145_274, -28.296_333, -8.363_269]),
+            (45.0, 0.0, [-10.578_865, -25.274_569, -11.397_547]),
+            (90.0, 0.0, [-1.848_434, -12.279_706, 0.0]),
+            (0.0, std::f64::consts::FRAC_PI_2, [-12.015_729, -29.353_035, -5.183_563]),
+        ] {
+            let [x, y, z] = rod(roll, twist).tip().position;
+            let got = [x - 0.05, y, z];
+            assert!(got.iter().zip(want).all(|(g, w)| (1e3 * g - w).abs() < 2e-6), "{roll}: {got:?}");
+        }
+    }
+
+    /// The bend of Bathe and Bolourchi with GJ = EI and with that of a square, in thread size too.
     #[test]
     fn arcs_under_a_load_across() {
-        let arc = |radius: f64, angle: f64, stiffness: [f64; 2], load: f64| Cantilever {
+        let arc = |radius: f64, angle: f64, stiffness: [f64; 3], load: f64| Cantilever {
             start: [0.0; 3],
             frame: [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             length: radius * angle,
@@ -149,10 +178,12 @@ mod tests {
         };
         use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
         let ei = 1e7 / 12.0;
-        let t1 = [T1.ei(), T1.gj()];
+        let t1 = [T1.ei(), T1.ei(), T1.gj()];
         let k = T1.ei() / 0.02_f64.powi(2);
         for (rod, want) in [
-            (arc(100.0, FRAC_PI_4, [ei, ei], 600.0), [15.6851, 47.1513, 53.4686]),
+            (arc(100.0, FRAC_PI_4, [ei, ei, ei], 600.0), [15.6851, 47.1513, 53.4686]),
+            // The tip of the extensible rod is (15.5577, 46.8916, 53.6080).
+            (arc(100.0, FRAC_PI_4, [ei, ei, 0.5e7 * SQUARE], 600.0), [15.5580, 46.8927, 53.6012]),
             (arc(0.02, FRAC_PI_4, t1, k), [5.66192e-3, 13.81536e-3, 3.10598e-3]),
             (arc(0.02, FRAC_PI_4, t1, 7.2 * k), [3.07964e-3, 9.32177e-3, 10.75004e-3]),
             (arc(0.02, FRAC_PI_2, t1, k), [14.38107e-3, 16.86992e-3, 16.70853e-3]),

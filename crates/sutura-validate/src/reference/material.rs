@@ -5,6 +5,9 @@ use std::f64::consts::PI;
 /// Acceleration of gravity in all cases \[m/s^2\].
 pub const GRAVITY: f64 = 9.81;
 
+/// Torsion constant of a square over the fourth power of its side (Saint-Venant).
+pub const SQUARE: f64 = 0.140_577;
+
 /// A round elastic rod.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rod {

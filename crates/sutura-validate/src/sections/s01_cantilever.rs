@@ -1,11 +1,12 @@
 //! Cantilevers against the elastica.
 
-use super::{ELEMENTS, vector};
+use super::{ELEMENTS, independence, vector};
 use crate::reference::material::{GRAVITY, T1};
 use crate::reference::{elastica, links};
 use crate::results::{Curve, Plot, StudyResult};
-use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, columns};
+use crate::study::{Bar, LeftOut, Quantity, Section, Study, columns, last};
 use std::f64::consts::TAU;
+use sutura_scene::Outcome;
 
 /// Length of the rods under a tip load \[m\].
 const LENGTH: f64 = 0.05;
@@ -22,6 +23,7 @@ pub fn section() -> Section {
          rigid links has joints of n EI / L, half of one at the clamp, and half of a link's mass at its end: what remains against it are \
          the rod's shear and stretch (some 1e-5) and the solver.",
     );
+    let drop = |o: &Outcome| -1e3 * last(o, "tip.z");
     for k in TIP_LOADS {
         section.studies.push(tip_load(k));
     }
@@ -31,8 +33,8 @@ pub fn section() -> Section {
     for turns in [0.125, 0.25, 0.5, 0.75] {
         section.studies.push(tip_moment(turns));
     }
-    section.studies.push(independence("tip load k = 5, other settings", loaded(5.0)));
-    section.studies.push(independence("own weight g = 5, other settings", weighted(5.0)));
+    section.studies.push(independence("tip load k = 5, other settings", 0.1, loaded(5.0), "drop [mm]", drop));
+    section.studies.push(independence("own weight g = 5, other settings", 0.1, weighted(5.0), "drop [mm]", drop));
     section.plots = plots;
     section.left_out = &[LeftOut {
         what: "tip moment of a whole turn",
@@ -101,36 +103,6 @@ fn tip_moment(turns: f64) -> Study {
         .elements("rod", &ELEMENTS)
         .quantity(Quantity::last("reach / L", "tip.x", 1.0 / LENGTH, exact[0], "arc", Bar::Order(0.01, 1.8)).scale(1.0))
         .quantity(Quantity::last("drop / L", "tip.z", -1.0 / LENGTH, exact[1], "arc", Bar::Order(0.01, 1.8)).scale(1.0))
-}
-
-/// The same statics with other settings of the solver.
-fn independence(name: &str, study: Study) -> Study {
-    // Short steps damp little by themselves; without more the slow swing would take minutes to die.
-    let short = |n: u32| {
-        let settings = [("solver.substep", format!("{:e}", 1.0 / f64::from(n))), ("solver.linear_damping", "0.99".into())];
-        Level::new(format!("1/{n} s, damping 0.99"), 0.0, &settings)
-    };
-    let mut levels = vec![
-        Level::new("100 ms", 0.0, &[]),
-        Level::new("50 ms", 0.0, &[("solver.substep", "50 ms".into())]),
-        short(600),
-        short(1200),
-        short(2400),
-        Level::new("24 iterations", 0.0, &[("solver.newton_max", "24".into())]),
-        Level::new("tolerance 0.003", 0.0, &[("solver.tolerance", "0.003".into())]),
-    ];
-    for damping in ["0.5", "0.99"] {
-        levels.push(Level::new(format!("damping {damping}"), 0.0, &[("solver.linear_damping", damping.into()), ("solver.angular_damping", damping.into())]));
-    }
-    let mut study = study.levels(levels).quantity(Quantity::measured(
-        "drop [mm]",
-        |outcome| -1e3 * crate::study::last(outcome, "tip.z"),
-        Vec::new(),
-        "each other",
-        Bar::Same(0.001),
-    ));
-    study.name = name.into();
-    study
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {

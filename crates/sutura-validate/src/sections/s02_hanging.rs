@@ -1,6 +1,6 @@
 //! Chains and heavy rods that hang.
 
-use super::vector;
+use super::{independence, vector};
 use crate::reference::catenary::{self, Ends};
 use crate::reference::links;
 use crate::reference::material::{GRAVITY, T1, T2};
@@ -30,6 +30,8 @@ pub fn section() -> Section {
         section.studies.push(heavy(weight, Ends::Pinned));
         section.studies.push(heavy(weight, Ends::Clamped));
     }
+    let force = |o: &Outcome| 1e3 * last(o, "right_force.x");
+    section.studies.push(independence("chain, span 0.5, other settings", 0.1, hanging(0.5, 0.0).levels(Vec::new()), "horizontal force [mN]", force));
     for mode in 0..3 {
         section.studies.push(swinging(mode));
     }

@@ -1,12 +1,13 @@
 //! Columns that stand, fall and buckle.
 
-use super::{ELEMENTS, vector};
+use super::{ELEMENTS, independence, vector};
 use crate::reference::elastica;
 use crate::reference::links::{self, End};
 use crate::reference::material::{GRAVITY, T1};
 use crate::results::{Curve, Plot, StudyResult};
 use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, last};
 use std::f64::consts::PI;
+use sutura_scene::Outcome;
 
 const LENGTH: f64 = 0.05;
 /// Columns stand or fall at these parts of the load of the chain of as many links.
@@ -51,6 +52,8 @@ pub fn section() -> Section {
     for e in [0.05, 0.2] {
         section.studies.push(buckled(e, End::Clamped));
     }
+    let load = |o: &Outcome| 1e3 * last(o, "load");
+    section.studies.push(independence("pinned, shortened by 0.2, other settings", 5e-3, buckled(0.2, End::Pinned), "load [mN]", load));
     section.plots = plots;
     section.left_out = &[LeftOut { what: "guidewire in a straight vessel", why: "there is no hollow shape but a mesh, not set up yet" }];
     section

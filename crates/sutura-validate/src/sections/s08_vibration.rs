@@ -5,7 +5,7 @@ use crate::reference::links;
 use crate::reference::material::T1;
 use crate::reference::vibration::{self, decay, euler_decay, euler_frequency, frequency};
 use crate::results::{Curve, Plot, StudyResult};
-use crate::study::{Bar, Level, Quantity, Section, Study, series};
+use crate::study::{Bar, Level, Quantity, Section, Study, columns, series};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 const LENGTH: f64 = 0.05;
@@ -27,6 +27,10 @@ pub fn section() -> Section {
     }
     for mode in [1, 2] {
         section.studies.push(string(mode));
+    }
+    for mode in [2, 3] {
+        section.studies.push(ring(mode, false));
+        section.studies.push(ring(mode, true));
     }
     section.studies.push(tip_mass());
     section.studies.push(bob());
@@ -132,6 +136,39 @@ fn string(mode: u32) -> Study {
     timed(Study::new(format!("stiff string, 100 mm, 0.1 N, mode {mode}"), "string"), h, 6.0, TAU * f)
         .levels(COUNTS.map(|n| level(n, shape(n))).into())
         .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "bow")), vec![hz(TAU * f, h)], "stiff string", Bar::Order(0.005, 1.8)))
+}
+
+/// A closed ring, round at rest, in a mode of so many waves in or across its plane (Love 1927, 293; no stretch, no rotary inertia).
+fn ring(waves: u32, across: bool) -> Study {
+    const R: f64 = 0.02;
+    const H: f64 = 5e-5;
+    const HEIGHT: f64 = 1e-3;
+    let n = f64::from(waves);
+    let soft = if across { T1.ei() / T1.gj() } else { 1.0 };
+    let w = (T1.ei() / T1.mass() / (n * n + soft)).sqrt() * n * (n * n - 1.0) / (R * R);
+    let shape = |elements: usize| {
+        let point = |i: usize| {
+            let s = TAU * i as f64 / elements as f64;
+            let (sin, cos) = (n * s).sin_cos();
+            // In the plane points move along the ring, too, and keep their distance.
+            let (radius, angle, z) = if across { (R, s, R * HEIGHT * cos) } else { (R * (1.0 + HEIGHT * cos), s - HEIGHT / n * sin, 0.0) };
+            vector([radius * angle.cos(), radius * angle.sin(), z])
+        };
+        format!("[{}]", (0..elements).map(point).collect::<Vec<_>>().join(", "))
+    };
+    let level = |elements: usize| Level::new(elements.to_string(), 1.0 / elements as f64, &[("thread.ring.points", shape(elements))]);
+    let swing = move |o: &sutura_scene::Outcome| {
+        let start = columns(o, "start", ["time", "x", "z"]);
+        frequency(&start.iter().map(|[t, x, z]| (*t, if across { *z } else { x - R })).collect::<Vec<_>>())
+    };
+    let word = if across { "across" } else { "in" };
+    let scale = T1.mass() * TAU * R * R * HEIGHT * w;
+    let push = move |o: &sutura_scene::Outcome| series(o, "momentum").iter().map(|p| p.1).fold(0.0, f64::max) / scale;
+    timed(Study::new(format!("closed ring, {waves} waves {word} its plane"), "vibrating_ring"), H, 6.0, w)
+        .levels([24, 48, 96].map(level).into())
+        .quick(waves == 2 && !across)
+        .quantity(Quantity::measured("frequency [Hz]", swing, vec![hz(w, H)], "inextensible ring", Bar::Order(0.005, 1.8)))
+        .quantity(Quantity::measured("largest momentum over that of its speed", push, Vec::new(), "none", Bar::AtMost(0.01)))
 }
 
 fn tip_mass() -> Study {

@@ -3,7 +3,8 @@
 use super::{ELEMENTS, vector};
 use crate::reference::kirchhoff::{Cantilever, Station};
 use crate::reference::material::T1;
-use crate::study::{Bar, LeftOut, Level, Quantity, Section, Study, last};
+use crate::study::{Bar, Level, Quantity, Section, Study, last};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 const LENGTH: f64 = 0.05;
 
@@ -13,13 +14,17 @@ pub fn section() -> Section {
         "Frames",
         "A cantilever of 50 mm of 2-0 monofilament along x, 1 mN along -y at its tip and a dead torque of 2e-5 N m about x there, against the Kirchhoff rod \
          by shooting; the opposite torque mirrors z. What a round, naturally straight rod does depends neither on the roll of its clamp nor on \
-         how the whole scene is turned.",
+         how the whole scene is turned. A section that is four times as stiff about d1 as about d2 (an ellipse), rolled about the rod, and one that turns by 90 degrees along the \
+         rod, against shooting with two bending stiffnesses.",
     );
     section.studies.push(twisted(2e-5));
     section.studies.push(twisted(-2e-5));
     section.studies.push(roll());
     section.studies.push(turned());
-    section.left_out = &[LeftOut { what: "sections with two bending stiffnesses, rolled and pre-twisted", why: "sections are round" }];
+    for degrees in [0.0, 30.0, 45.0, 90.0] {
+        section.studies.push(flat(degrees, 0.0));
+    }
+    section.studies.push(flat(0.0, FRAC_PI_2));
     section
 }
 
@@ -28,7 +33,7 @@ fn exact(moment: f64) -> Station {
         start: [0.0; 3],
         frame: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
         length: LENGTH,
-        stiffness: [T1.ei(), T1.gj()],
+        stiffness: [T1.ei(), T1.ei(), T1.gj()],
         rest: [0.0; 3],
         force: [0.0, -1e-3, 0.0],
         moment: [moment, 0.0, 0.0],
@@ -98,4 +103,38 @@ fn turned() -> Study {
         "each other",
         Bar::Same(1e-9),
     ))
+}
+
+/// An ellipse that bends about d2 as the round thread does, and is four times as stiff about d1; rolled, or turning along the rod.
+fn flat(degrees: f64, pretwist: f64) -> Study {
+    let radius = 0.5 * T1.diameter;
+    // Semi-axes a along d1 and 2a along d2: moments of area 2 pi a^4 and pi a^4 / 2, torsion constant 8 pi a^4 / 5.
+    let a = radius * 0.5_f64.powf(0.25);
+    let twisting = 1.6 * PI * a.powi(4);
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    let tip = Cantilever {
+        start: [0.0; 3],
+        frame: [[0.0, cos, sin], [0.0, -sin, cos], [1.0, 0.0, 0.0]],
+        length: LENGTH,
+        stiffness: [4.0 * T1.ei(), T1.ei(), T1.gj()],
+        rest: [0.0, 0.0, pretwist / LENGTH],
+        force: [0.0, -1e-3, 0.0],
+        moment: [0.0; 3],
+    }
+    .tip()
+    .position;
+    let name = if pretwist == 0.0 { format!("flat section, rolled by {degrees} degrees") } else { "flat section, turning by 90 degrees".into() };
+    let mut study = Study::new(name, "cantilever")
+        .set("thread.rod.section", format!("{{ ellipse = [{a:e}, {:e}] }}", 2.0 * a))
+        .set("thread.rod.shear_modulus", format!("{:e}", T1.gj() / twisting))
+        .set("thread.rod.roll", format!("\"{degrees} deg\""))
+        .set("thread.rod.pretwist", format!("{pretwist:e}"))
+        .set("phase.load.action[0]", load([0.0, -1e-3, 0.0], [0.0; 3]))
+        .elements("rod", &ELEMENTS)
+        .quick(degrees == 30.0);
+    for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
+        let name = format!("{} / L", probe.replace('.', " "));
+        study = study.quantity(Quantity::last(name, probe, 1.0 / LENGTH, tip[i] / LENGTH, "shooting", Bar::Order(0.005, 1.8)).scale(1.0));
+    }
+    study
 }

@@ -37,6 +37,12 @@ fn stepped(h: f64) -> Level {
     Level::new(format!("{} ms", 1e3 * h), h, &[("solver.substep", format!("{h:e}")), ("frame_rate", format!("{:e}", 1.0 / h))])
 }
 
+/// The tip after two seconds. The rod begins in the shape of the continuum's mode, and the clamp turns its first element: a part of 0.005 of the second
+/// mode is in it, which at the shortest substep is more than the first mode loses in eight seconds, and dies within one.
+fn late(o: &Outcome) -> Vec<(f64, f64)> {
+    series(o, "tip").into_iter().filter(|p| p.0 > 2.0).collect()
+}
+
 fn cantilever() -> Study {
     const N: usize = 20;
     const LENGTH: f64 = 0.1;
@@ -45,7 +51,7 @@ fn cantilever() -> Study {
     Study::new("cantilever of 100 mm, mode 1", "vibrating")
         .set("solver.integrator", "tr_bdf2")
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
-        .set("phase.swing.duration", "8 s")
+        .set("phase.swing.duration", "24 s")
         .levels(SUBSTEPS.map(stepped).into())
         .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "tip")), vec![w / TAU], "chain of 20 links", Bar::Order(0.005, 1.8)))
         .quantity(Quantity::measured(
@@ -55,7 +61,7 @@ fn cantilever() -> Study {
             "TR-BDF2",
             Bar::Within(0.002),
         ))
-        .quantity(Quantity::measured("decay [1/s]", |o| decay(&series(o, "tip")), SUBSTEPS.map(|h| tr_bdf2_decay(w, h)).to_vec(), "TR-BDF2", Bar::Within(0.05)))
+        .quantity(Quantity::measured("decay [1/s]", |o| decay(&late(o)), SUBSTEPS.map(|h| tr_bdf2_decay(w, h)).to_vec(), "TR-BDF2", Bar::Within(0.01)))
 }
 
 fn pendulum() -> Study {

@@ -4,8 +4,8 @@ use crate::finite;
 use crate::input::Input;
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, Rod,
-    RodSpec, Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Stretch, World,
+    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, Load, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile,
+    Reel, ReelLaw, ReelSpec, RestShape, Rod, RodSpec, Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Stretch, Weld, WeldRest, WeldSpec, World,
 };
 
 /// What one input may do: edits, threads, elements of one, substeps in all.
@@ -13,6 +13,9 @@ const MOST_EDITS: u32 = 60;
 const MOST_THREADS: usize = 3;
 const MOST_ELEMENTS: usize = 10;
 const MOST_SUBSTEPS: f64 = 40.0;
+/// Where there are reels, which may feed in a thousand elements a substep: substeps of one step, and elements beyond which an input is at its end.
+const MOST_REELED: f64 = 4.0;
+const MOST_FED: usize = 500;
 
 /// A world, and every handle that it ever gave: those of things that are gone too.
 struct Session {
@@ -21,6 +24,8 @@ struct Session {
     shapes: Vec<Handle<Shape>>,
     grips: Vec<Handle<Grip>>,
     loads: Vec<Handle<Load>>,
+    welds: Vec<Handle<Weld>>,
+    reels: Vec<Handle<Reel>>,
     snapshots: Vec<Vec<u8>>,
     substeps: f64,
 }
@@ -29,7 +34,8 @@ pub fn run(data: &[u8]) {
     let mut input = Input::new(data);
     let settings = Settings { halvings: 2, ..Settings::default() };
     let world = World::new(settings).unwrap_or_else(|e| panic!("{e}"));
-    let mut session = Session { world, rods: vec![], shapes: vec![], grips: vec![], loads: vec![], snapshots: vec![], substeps: 0.0 };
+    let mut session =
+        Session { world, rods: vec![], shapes: vec![], grips: vec![], loads: vec![], welds: vec![], reels: vec![], snapshots: vec![], substeps: 0.0 };
     for _ in 0..MOST_EDITS {
         if input.is_empty() || session.substeps > MOST_SUBSTEPS {
             break;
@@ -41,7 +47,9 @@ pub fn run(data: &[u8]) {
 impl Session {
     /// One edit. Errors are answers; what matters is that the world stays usable.
     fn edit(&mut self, input: &mut Input<'_>) {
-        match input.below(20) {
+        let which = input.byte();
+        match which % 20 {
+            _ if which >= 240 => self.edit_joined(which, input),
             0..=1 => self.insert_rod(input),
             2 => {
                 let shape = ShapeSpec { geometry: geometry(input), pose: pose(input), surface: input.below(3) as u32, motion: motion(input) };
@@ -115,6 +123,86 @@ impl Session {
         self.read();
     }
 
+    /// Edits of welds, reels and closed threads, and of the integrator.
+    fn edit_joined(&mut self, which: u8, input: &mut Input<'_>) {
+        match which {
+            240..=242 => self.branch(input),
+            243 => {
+                let places = (0..2 + input.below(2)).filter_map(|_| Some((pick(&self.rods, input)?, place(input)))).collect();
+                let rest = input.pick(&[WeldRest::AsInserted, WeldRest::Straight]);
+                self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest }));
+            }
+            244 => {
+                if let Some(weld) = pick(&self.welds, input) {
+                    let _ = self.world.remove_weld(weld);
+                }
+            }
+            // A seam that is opened, or what else is welded there.
+            245 => {
+                if let Some(rod) = pick(&self.rods, input)
+                    && let Ok(Some(weld)) = self.world.weld_at(rod, input.below(MOST_ELEMENTS) as u32)
+                {
+                    self.welds.push(weld);
+                    let _ = self.world.remove_weld(weld);
+                }
+            }
+            246..=248 => {
+                if let Some(rod) = pick(&self.rods, input) {
+                    let supply = if input.truth() { Some(input.size(5e-3)) } else { None };
+                    self.reels.extend(self.world.insert_reel(&ReelSpec { rod, at_end: input.truth(), law: law(input), supply }));
+                }
+            }
+            249..=250 => {
+                if let Some(reel) = pick(&self.reels, input) {
+                    let _ = self.world.set_reel(reel, law(input));
+                }
+            }
+            251..=252 => {
+                let integrator = input.pick(&[Integrator::TrBdf2, Integrator::ImplicitEuler]);
+                let _ = self.world.set_settings(Settings { integrator, ..self.world.settings().clone() });
+            }
+            253 => {
+                if self.world.view().rods().count() < MOST_THREADS {
+                    let material = Material { bend_damping: input.size(0.01), ..Material::elastic(2e9, 1150.0) };
+                    let spec = RodSpec::ring(input.vector(2e-3), DVec3::Z, DVec3::X * input.size(5e-3), 3 + input.below(10), 1.5e-4, material);
+                    let stretch = input.pick(&[Stretch::Elastic, Stretch::Inextensible]);
+                    let rest = if input.truth() { RestShape::Straight } else { RestShape::AsInserted };
+                    let closure = Some(Closure { twist: input.number(3.0) });
+                    self.rods.extend(self.world.insert_rod(&RodSpec { closure, stretch, rest, ..spec }));
+                }
+            }
+            _ => self.step(input),
+        }
+    }
+
+    /// A thread that begins or ends where another one has a particle, welded to it there.
+    fn branch(&mut self, input: &mut Input<'_>) {
+        let Some(from) = pick(&self.rods, input) else { return };
+        let Ok(view) = self.world.rod(from) else { return };
+        let particle = input.below(view.n_elements() + 1);
+        let (at, radius) = (view.positions()[particle], view.radius());
+        let to = at + input.direction() * input.size(5e-3);
+        let n = 1 + input.below(MOST_ELEMENTS);
+        let material = Material::elastic(input.size(1e9), 1150.0);
+        let (spec, place) = if input.truth() {
+            (RodSpec::straight(at, to, n, radius, material), Place::Start)
+        } else {
+            (RodSpec::straight(to, at, n, radius, material), Place::End)
+        };
+        if self.world.view().rods().count() >= MOST_THREADS {
+            return;
+        }
+        if let Ok(rod) = self.world.insert_rod(&spec) {
+            self.rods.push(rod);
+            let mut places = vec![(from, Place::Particle(particle as u32)), (rod, place)];
+            if input.truth() {
+                places.reverse();
+            }
+            let rest = input.pick(&[WeldRest::AsInserted, WeldRest::Straight]);
+            self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest }));
+        }
+    }
+
     fn insert_rod(&mut self, input: &mut Input<'_>) {
         if self.world.view().rods().count() >= MOST_THREADS {
             return;
@@ -162,6 +250,9 @@ impl Session {
         if odd & 64 != 0 {
             spec.frames = Some((0..n).map(|_| input.rotation()).collect());
         }
+        if odd & 128 != 0 {
+            spec.closure = Some(Closure { twist: input.number(2.0) });
+        }
         spec.material = material;
         spec.surface = input.below(3) as u32;
         self.rods.extend(self.world.insert_rod(&spec));
@@ -190,7 +281,8 @@ impl Session {
         let settings = self.world.settings();
         let substeps = (dt / settings.substep).ceil().max(1.0) * f64::from(1 << settings.halvings) / 4.0;
         // What is refused as too long costs nothing.
-        if substeps > MOST_SUBSTEPS && dt / settings.substep <= 1e6 {
+        let most = if self.reels.is_empty() { MOST_SUBSTEPS } else { MOST_REELED };
+        if substeps > most && dt / settings.substep <= 1e6 {
             return;
         }
         self.substeps += substeps.min(MOST_SUBSTEPS);
@@ -199,6 +291,9 @@ impl Session {
         if report.incidents.is_empty() {
             finite::assert(finite::readings(&self.world));
         }
+        if self.world.view().rods().map(|r| r.n_elements()).sum::<usize>() > MOST_FED {
+            self.substeps = f64::INFINITY;
+        }
     }
 
     /// What can be read by handle, those of things that are gone too.
@@ -206,6 +301,11 @@ impl Session {
         for grip in &self.grips {
             if let (Ok(pose), Ok(wrench)) = (self.world.grip_pose(*grip), self.world.grip_wrench(*grip)) {
                 finite::assert(finite::all("grip", &[pose.position, wrench.force, wrench.torque]));
+            }
+        }
+        for reel in &self.reels {
+            if let Ok(fed) = self.world.reel_fed(*reel) {
+                finite::assert(finite::one("length fed", fed));
             }
         }
         for shape in &self.shapes {
@@ -237,6 +337,10 @@ fn place(input: &mut Input<'_>) -> Place {
 
 fn pose(input: &mut Input<'_>) -> Pose {
     Pose::new(input.vector(3e-3), if input.truth() { input.rotation() } else { Pose::IDENTITY.orientation })
+}
+
+fn law(input: &mut Input<'_>) -> ReelLaw {
+    if input.truth() { ReelLaw::Rate(input.number(0.1)) } else { ReelLaw::Brake(input.size(0.1)) }
 }
 
 fn drive(input: &mut Input<'_>) -> Drive {

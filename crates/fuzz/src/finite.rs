@@ -19,6 +19,10 @@ pub fn state(view: View<'_>) -> Found {
         all("position of a shape", &[shape.pose.position])?;
         rotation("frame of a shape", shape.pose.orientation)?;
     }
+    for weld in view.welds() {
+        all("position of a weld", &[weld.pose.position])?;
+        rotation("frame of a weld", weld.pose.orientation)?;
+    }
     Ok(())
 }
 
@@ -33,7 +37,7 @@ pub fn readings(world: &World) -> Found {
             one("axial stiffness", rod.axial_stiffness(e))?;
             one("mass per length", rod.mass_per_length(e))?;
         }
-        for joint in 0..n - 1 {
+        for joint in 0..rod.n_joints() {
             all("strain", &[rod.strain(joint)])?;
             all("moment", &[rod.moment(joint)])?;
         }

@@ -1,17 +1,21 @@
 //! Length fed in and drawn back. The rest length of the last element at a reel is State; what the model says of that element follows from it, and
 //! elements are cut in two or joined between substeps.
 
+use crate::handle::Slots;
 use crate::model::Model;
-use crate::model::grip::{Hold, LoadKind, Place};
+use crate::model::grip::{Hold, Place};
 use crate::model::reel::ReelLaw;
+use crate::model::rod::RodModel;
 use crate::rod::brake::Brake;
-use crate::state::{ReelState, State};
+use crate::state::{LoadState, ReelState, ShapeContact, State, ThreadContact};
 
 /// Lengths of the last element, over its length when the reel was set up, beyond which it is cut and below which it is joined with the next.
 const LONGEST: f64 = 1.6;
 const SHORTEST: f64 = 0.4;
 /// Where it cannot be joined it is not drawn back beyond this.
 const LEAST: f64 = 0.25;
+/// Length up to which a substep feeds in: what would be more elements than that is not a rate but a jump.
+const MOST: f64 = 1000.0;
 
 impl ReelState {
     /// The element at the reel, in the world's arrays.
@@ -23,9 +27,10 @@ impl ReelState {
 
 /// Feeds the length of a substep at its start. True where there are reels: weights are others then.
 pub(crate) fn turn(model: &mut Model, state: &mut State, h: f64) -> bool {
-    for (_, reel) in state.reels.iter_mut() {
+    let State { reels, loads, rest_length, .. } = state;
+    for (_, reel) in reels.iter_mut() {
         if let ReelLaw::Rate(rate) = reel.law {
-            reel.feed(rate * h);
+            reel.feed(model, rest_length, loads, rate * h);
         }
     }
     follow(model, state);
@@ -36,8 +41,9 @@ pub(crate) fn turn(model: &mut Model, state: &mut State, h: f64) -> bool {
 pub(crate) fn pay_out(model: &mut Model, state: &mut State, brakes: &[Brake]) {
     for brake in brakes.iter().filter(|b| b.slips) {
         let paid = brake.paid(model, state);
-        for (_, reel) in state.reels.iter_mut().filter(|(slot, _)| *slot == brake.reel) {
-            reel.feed(paid);
+        let State { reels, loads, rest_length, .. } = &mut *state;
+        for (_, reel) in reels.iter_mut().filter(|(slot, _)| *slot == brake.reel) {
+            reel.feed(model, rest_length, loads, paid);
         }
     }
     if !brakes.is_empty() {
@@ -47,36 +53,33 @@ pub(crate) fn pay_out(model: &mut Model, state: &mut State, brakes: &[Brake]) {
 
 impl ReelState {
     /// Feeds in as much of `length` as there is.
-    pub fn feed(&mut self, length: f64) {
-        let most = self.supply.map_or(length, |s| length.min(s));
-        let length = most.max(LEAST * self.nominal - self.length);
-        self.length += length;
+    fn feed(&mut self, model: &Model, rest_length: &mut [f64], loads: &mut Slots<LoadState>, length: f64) {
+        let now = &mut rest_length[self.element(model)];
+        let there_is = self.supply.map_or(length, |s| length.min(s));
+        let length = there_is.min((MOST * self.nominal - *now).max(0.0)).max(LEAST * self.nominal - *now);
+        *now += length;
         self.fed += length;
         self.supply = self.supply.map(|s| s - length);
+        if !self.at_end {
+            // Places told by their arc from the start keep their material, also where it is on the reel.
+            for (_, load) in loads.iter_mut().filter(|(_, l)| l.rod == self.rod) {
+                if let Some(Place::Arc(s)) = load.kind.place_mut() {
+                    *s += length;
+                }
+            }
+        }
     }
 }
 
-/// Makes the model's end elements what the reels say.
-pub(crate) fn follow(model: &mut Model, state: &mut State) {
+/// Makes the model's elements at reels as long as the state says.
+pub(crate) fn follow(model: &mut Model, state: &State) {
     for (_, reel) in state.reels.iter() {
         let e = reel.element(model);
-        let more = reel.length - model.rest_length[e];
-        if more == 0.0 {
-            continue;
-        }
-        model.rest_length[e] = reel.length;
-        state.rest_length[e] = reel.length;
-        model.refresh_element(e);
-        for joint in [e, e + 1] {
-            model.refresh_joint(joint);
-        }
-        if !reel.at_end {
-            // Places told by their arc from the start keep their material.
-            for (_, load) in state.loads.iter_mut().filter(|(_, l)| l.rod == reel.rod) {
-                if let LoadKind::Point { place: Place::Arc(s), .. } | LoadKind::Mass { place: Place::Arc(s), .. } = &mut load.kind {
-                    *s = (*s + more).max(0.0);
-                }
-            }
+        if model.rest_length[e] != state.rest_length[e] {
+            model.rest_length[e] = state.rest_length[e];
+            model.refresh_element(e);
+            model.refresh_joint(e);
+            model.refresh_joint(e + 1);
         }
     }
     if state.reels.iter().next().is_some() {
@@ -88,24 +91,24 @@ pub(crate) fn follow(model: &mut Model, state: &mut State) {
 pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
     let mut changed = false;
     for slot in 0..state.reels.len() as u32 {
-        while let Some(reel) = state.reels.at(slot).cloned() {
-            let e = reel.element(model);
+        // What a substep feeds in is cut before the next one.
+        for _ in 0..MOST as u32 {
+            let Some(reel) = state.reels.at(slot) else { break };
+            let (e, nominal, length) = (reel.element(model), reel.nominal, state.rest_length[reel.element(model)]);
             let n = model.rods.at(reel.rod).expect("reels go with their rods").n_elements;
             // The particle between the last element and the next.
             let inner = if reel.at_end { e } else { e + 1 };
             let drawn = if let ReelLaw::Rate(rate) = reel.law { (-rate * h).max(0.0) } else { 0.0 };
-            if reel.length - drawn > LONGEST * reel.nominal {
+            if length - drawn > LONGEST * nominal {
                 // Toward the reel stays what is left of it.
-                let first = if reel.at_end { reel.nominal } else { reel.length - reel.nominal };
+                let first = if reel.at_end { nominal } else { length - nominal };
+                let rod = reel.rod;
                 split_state(model, state, slot, e, first);
-                split_model(model, reel.rod, e);
-                set(state, slot, reel.length - reel.nominal);
-            } else if reel.length - drawn < SHORTEST * reel.nominal && n > 2 && model.weld_of[inner].is_none() && !held(model, state, inner) {
-                let first = inner - 1;
-                let joined = model.rest_length[first] + model.rest_length[first + 1];
-                merge_state(model, state, slot, first, reel.at_end);
-                merge_model(model, reel.rod, first);
-                set(state, slot, joined);
+                split_model(model, rod, e);
+            } else if length - drawn < SHORTEST * nominal && n > 2 && model.weld_of[inner].is_none() && !held(model, state, inner) {
+                let (rod, at_end) = (reel.rod, reel.at_end);
+                merge_state(model, state, slot, inner - 1, at_end);
+                merge_model(model, rod, inner - 1);
             } else {
                 break;
             }
@@ -123,12 +126,6 @@ pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
     changed
 }
 
-fn set(state: &mut State, slot: u32, length: f64) {
-    for (_, reel) in state.reels.iter_mut().filter(|(k, _)| *k == slot) {
-        reel.length = length;
-    }
-}
-
 /// Whether a grip holds a particle.
 pub(crate) fn held(model: &Model, state: &State, particle: usize) -> bool {
     state.grips.iter().any(|(_, g)| {
@@ -142,14 +139,20 @@ fn added(state: &State, rod: u32, at_end: bool) -> i32 {
     state.reels.iter().map(|(_, r)| r).find(|r| r.rod == rod && r.at_end == at_end).map_or(0, |r| r.added)
 }
 
+/// Whether a reel can work on a rod: elements at its ends are cut and joined as if they were all alike.
+pub(crate) fn suits(model: &Model, rod: &RodModel) -> bool {
+    let first = rod.first as usize;
+    rod.n_elements >= 2 && rod.elements().all(|k| model.section[k] == model.section[first] && model.rest_half[k] == glam::DQuat::IDENTITY)
+}
+
 /// Whether a state read from outside has lengths and reels that the model, which now fits the state `from`, can be made to fit.
 pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'static str> {
     for (_, reel) in to.reels.iter() {
-        let numbers = [reel.nominal, reel.length, reel.fed, reel.supply.unwrap_or(0.0)].iter().all(|v| v.is_finite()) && reel.nominal > 0.0;
+        let numbers = reel.nominal.is_finite() && reel.nominal > 0.0 && reel.fed.is_finite() && reel.supply.is_none_or(|s| s.is_finite() && s >= 0.0);
         let rod = model.rods.at(reel.rod).ok_or("a reel is at a thread that is not here")?;
         let alone = to.reels.iter().filter(|(_, r)| (r.rod, r.at_end) == (reel.rod, reel.at_end)).count() == 1;
         let brake = matches!(reel.law, ReelLaw::Brake(_)) && rod.stretch == crate::Stretch::Inextensible;
-        if !numbers || !alone || brake || reel.law.validate().is_err() {
+        if !numbers || !alone || brake || !suits(model, rod) || reel.law.validate().is_err() {
             return Err("a reel is out of range");
         }
     }
@@ -158,13 +161,24 @@ pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'sta
     let mut rods: Vec<_> = model.rods.iter().collect();
     rods.sort_unstable_by_key(|(_, r)| r.first);
     for (slot, rod) in rods {
-        let more = |at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end));
-        let n = i64::from(rod.n_elements) + more(false) + more(true);
-        let n = usize::try_from(n).ok().filter(|n| *n >= 1).ok_or("a reel has drawn back more than there is")?;
+        let more = [false, true].map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end)));
+        let now = i64::from(rod.n_elements);
+        let least = if to.reels.iter().any(|(_, r)| r.rod == slot) { 2 } else { 1 };
+        let n = usize::try_from(now + more[0] + more[1]).ok().filter(|n| *n >= least).ok_or("a reel has drawn back more than there is")?;
+        // Particles that go when elements are joined.
+        let gone = |k: i64| (1..=-more[0]).contains(&k) || (now + more[1]..now).contains(&k);
+        if model.welds.iter().flat_map(|(_, w)| &w.members).any(|m| m.rod == slot && gone(i64::from(m.particle))) {
+            return Err("it is of a world with other welds");
+        }
         let end = ends + n;
         let lengths = to.rest_length.get(ends..=end).ok_or("it is of a world with other threads")?;
         if !lengths[..n].iter().all(|l| l.is_finite() && *l > 0.0) || lengths[n] != 0.0 {
             return Err("a length of an element is out of range");
+        }
+        for (_, reel) in to.reels.iter().filter(|(_, r)| r.rod == slot) {
+            if lengths[if reel.at_end { n - 1 } else { 0 }] < LEAST * reel.nominal * (1.0 - 1e-9) {
+                return Err("a reel is out of range");
+            }
         }
         ends = end + 1;
     }
@@ -188,12 +202,10 @@ pub(crate) fn refit(model: &mut Model, from: &State, to: &State) {
             }
         }
     }
-    if model.rest_length != to.rest_length {
-        model.rest_length.clone_from(&to.rest_length);
-        for e in 0..model.rest_length.len() {
-            model.refresh_element(e);
-            model.refresh_joint(e);
-        }
+    model.rest_length.clone_from(&to.rest_length);
+    for e in 0..model.rest_length.len() {
+        model.refresh_element(e);
+        model.refresh_joint(e);
     }
 }
 
@@ -236,7 +248,7 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
     model.refresh_welds();
 }
 
-fn shift_model(rods: &mut crate::handle::Slots<crate::model::rod::RodModel>, rod: u32, e: usize, by: i32) {
+fn shift_model(rods: &mut Slots<RodModel>, rod: u32, e: usize, by: i32) {
     for (slot, r) in rods.iter_mut() {
         if slot == rod {
             r.n_elements = r.n_elements.saturating_add_signed(by);
@@ -263,7 +275,8 @@ fn split_state(model: &Model, state: &mut State, reel: u32, e: usize, first: f64
     rest_length[e] = first;
     let place = |k: u32, s: f64| match (k as usize).cmp(&e) {
         core::cmp::Ordering::Less => (k, s),
-        core::cmp::Ordering::Equal if s <= part => (k, s / part),
+        // Of a part too small to be told from none it is the end.
+        core::cmp::Ordering::Equal if s <= part => (k, (s / part).min(1.0)),
         core::cmp::Ordering::Equal => (k + 1, (s - part) / (1.0 - part)),
         core::cmp::Ordering::Greater => (k + 1, s),
     };
@@ -308,11 +321,8 @@ fn renumber_state(model: &Model, state: &mut State, reel: u32, e: usize, by: i32
         g.index = moved(g.index);
     }
     for (_, load) in state.loads.iter_mut().filter(|(_, l)| l.rod == rod) {
-        if let LoadKind::Point { place, .. } | LoadKind::Mass { place, .. } = &mut load.kind {
-            match place {
-                Place::Particle(k) | Place::Element(k) => *k = moved(*k),
-                Place::Start | Place::End | Place::Arc(_) => {}
-            }
+        if let Some(Place::Particle(k) | Place::Element(k)) = load.kind.place_mut() {
+            *k = moved(*k);
         }
     }
     for c in &mut state.thread_contacts {
@@ -320,5 +330,77 @@ fn renumber_state(model: &Model, state: &mut State, reel: u32, e: usize, by: i32
     }
     for c in &mut state.shape_contacts {
         (c.element, c.s) = place(c.element, c.s);
+    }
+    // One of an element with itself is none.
+    state.thread_contacts.retain(|c| c.a < c.b);
+    ThreadContact::sort(&mut state.thread_contacts);
+    ShapeContact::sort(&mut state.shape_contacts);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{LoadKind, LoadSpec, Material, ReelSpec, RodSpec, Settings, World};
+    use glam::DVec3;
+
+    /// A thread of ten elements with a reel at its start, stepped for a while in substeps that are put back and halved.
+    #[test]
+    fn an_arc_keeps_its_material_through_substeps_that_are_put_back() {
+        let mut world = World::new(Settings { newton_max: 1, halvings: 2, ..Settings::default() }).unwrap();
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0))).unwrap();
+        world.insert_grip(&crate::GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
+        let reel = world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.01), supply: None }).unwrap();
+        world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::Arc(0.015), mass: 1e-5, inertia: DVec3::ZERO } }).unwrap();
+        let rejected: u32 = (0..30).map(|_| world.step(1.0 / 60.0).rejected).sum();
+        assert!(rejected > 10, "{rejected}");
+        let fed = world.reel_fed(reel).unwrap();
+        let (_, mut state) = world.into_parts();
+        let arcs: Vec<f64> = state.loads.iter_mut().filter_map(|(_, l)| if let Some(Place::Arc(s)) = l.kind.place_mut() { Some(*s) } else { None }).collect();
+        assert!((arcs[0] - 0.015 - fed).abs() < 1e-12 && fed > 1e-3, "{arcs:?} {fed}");
+    }
+
+    #[test]
+    fn contacts_stay_in_order_when_an_element_is_cut_and_joined() {
+        let mut world = World::default();
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0))).unwrap();
+        world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.0), supply: None }).unwrap();
+        let (mut model, mut state) = world.into_parts();
+        let contact = |element: u32, s: f64| ShapeContact {
+            shape: 0,
+            element,
+            s,
+            normal: DVec3::Z,
+            normal_force: 1.0,
+            friction: DVec3::ZERO,
+            drift: DVec3::ZERO,
+            sliding: false,
+        };
+        // Of a shape 1 they come after all of a shape 0.
+        state.shape_contacts = vec![contact(0, 0.2), contact(0, 0.9), contact(1, 0.1), ShapeContact { shape: 1, ..contact(0, 0.3) }];
+        let pair = |a: u32, s: f64, b: u32| ThreadContact {
+            a,
+            b,
+            s,
+            t: 0.5,
+            normal: DVec3::Z,
+            normal_force: 1.0,
+            friction: DVec3::ZERO,
+            drift: DVec3::ZERO,
+            sliding: false,
+        };
+        state.thread_contacts = vec![pair(0, 0.9, 5), pair(0, 0.1, 6), pair(1, 0.5, 5)];
+        let in_order = |state: &State| {
+            assert!(state.shape_contacts.is_sorted_by_key(|c| (c.shape, c.element)), "{:?}", state.shape_contacts);
+            assert!(state.thread_contacts.is_sorted_by_key(|c| (c.a, c.b)), "{:?}", state.thread_contacts);
+        };
+        state.rest_length[0] *= 1.7;
+        follow(&mut model, &state);
+        assert!(renumber(&mut model, &mut state, 1e-3));
+        in_order(&state);
+        state.rest_length[0] *= 0.5;
+        follow(&mut model, &state);
+        assert!(renumber(&mut model, &mut state, 1e-3));
+        in_order(&state);
+        assert_eq!(state.thread_contacts.iter().map(|c| (c.a, c.b)).collect::<Vec<_>>(), [(0, 5), (0, 6), (1, 5)]);
     }
 }

@@ -179,7 +179,7 @@ variants!(LoadKind {
 });
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
-structure!(ReelState { rod, at_end, law, supply, nominal, length, fed, added });
+structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
 structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
 structure!(ShapeContact { shape, element, s, normal, normal_force, friction, drift, sliding });
 structure!(GripState { rod, index, hold, drive, ramp, taken_at, taken_pose, taken_velocity, taken_spin, pose, target, rest_half, half_span, force, torque });

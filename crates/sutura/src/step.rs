@@ -37,6 +37,8 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
         if reel::renumber(model, state, h) {
             scratch.fit(model);
             state.interrupt(Onset::Unknown);
+            // Who looks from state to state must not lose sight of the motion to come.
+            (interval.observe)(View { model, state });
         }
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });

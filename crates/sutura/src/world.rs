@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
-use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
+use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
@@ -186,9 +186,11 @@ impl World {
         for (_, weld) in model.welds.iter_mut() {
             weld.members.retain(|m| m.rod != rod.index);
         }
+        let apart: Vec<WeldModel> = model.welds.iter().map(|(_, w)| w).filter(|w| w.members.len() < 2).cloned().collect();
         model.welds.retain(|w| w.members.len() >= 2);
         model.refresh_welds();
         state.reels.retain(|r| r.rod != rod.index);
+        apart.iter().for_each(|weld| self.hold_alone(weld));
         Ok(())
     }
 
@@ -202,6 +204,9 @@ impl World {
             place.validate("weld", model, r)?;
             let particle = place.particle(model, r);
             let i = (r.first + particle) as usize;
+            if state.reels.iter().any(|(_, reel)| reel.rod == rod.index && particle == if reel.at_end { r.n_elements } else { 0 }) {
+                return Err(Error::invalid("weld", "places", place, "an end that has no reel"));
+            }
             if model.weld_of[i].is_some() || places.iter().any(|p| p.2 == i) {
                 return Err(Error::invalid("weld", "places", place, "a place that is not welded yet"));
             }
@@ -221,13 +226,18 @@ impl World {
             let n = model.rods.at(slot).expect("just read").n_elements;
             ((particle > 0).then(|| state.orientation[i - 1]), (particle < n).then(|| state.orientation[i]))
         };
-        // A thread that goes on through the weld decides how its cross-section is turned, else the first one that ends there.
-        let through = places.iter().find_map(|p| match frames(*p) {
+        // What a clamp holds there it goes on holding. Else a thread that goes on through the weld decides how its cross-section is turned, or the first
+        // one that ends there.
+        let clamp = state.grips.iter().map(|(_, g)| g).find(|g| g.hold == Hold::Clamp && places.iter().any(|p| (p.0, p.1) == (g.rod, g.index)));
+        if let Some(k) = clamp.and_then(|g| places.iter().position(|p| (p.0, p.1) == (g.rod, g.index))) {
+            places.swap(0, k);
+        }
+        let through = |p: &(u32, u32, usize)| match frames(*p) {
             (Some(a), Some(b)) => Some(row::weld::between(a, b, model.rest_half[p.2])),
             _ => None,
-        });
+        };
         let (before, after) = frames(places[0]);
-        let orientation = through.or(before).or(after).expect("a thread has frames");
+        let orientation = clamp.map(|g| g.pose.orientation).or_else(|| places.iter().find_map(through)).or(before).or(after).expect("a thread has frames");
         let straight = |q: DQuat, outward: DVec3| match spec.rest {
             WeldRest::AsInserted => q,
             // Turned so that it goes on where the first one leads.
@@ -243,9 +253,14 @@ impl World {
                 (Some(_), Some(_)) if spec.rest == WeldRest::Straight => {
                     return Err(Error::invalid("weld", "places", particle, "ends of threads where they go on straight"));
                 }
+                (a, b) if k == 0 && clamp.is_some() => {
+                    let held = Side::along(clamp.map_or(DQuat::IDENTITY, |g| g.rest_half));
+                    (a.map(|_| held), b.map(|_| held))
+                }
                 (Some(_), Some(_)) => {
-                    let quarter = Side::along(crate::math::half(model.rest_half[i]));
-                    (Some(quarter), Some(quarter))
+                    let own = Side::turned(orientation, through(place).expect("it goes through"));
+                    let side = Side { rest_half: crate::math::half(model.rest_half[i]), ..own };
+                    (Some(side), Some(side))
                 }
                 (a, b) if k == 0 => (a.map(|q| Side::turned(orientation, q)), b.map(|q| Side::turned(orientation, q))),
                 (a, b) => {
@@ -263,18 +278,33 @@ impl World {
         Ok(self.join(members, orientation))
     }
 
-    /// Takes a weld apart. A thread that went through it goes on, ends are free.
+    /// Takes a weld apart. A thread that went through it goes on, ends are free. A clamp there goes on holding its own thread as it is: its pose turns
+    /// from the cross-section of the weld to that of the thread.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
-        self.model.welds.remove(weld).ok_or(WELD)?;
+        let gone = self.model.welds.remove(weld).ok_or(WELD)?;
         self.state.interrupt(Onset::Unknown);
         self.model.refresh_welds();
+        self.hold_alone(&gone);
         Ok(())
+    }
+
+    /// Clamps at a weld that is gone hold the cross-section of their own thread from now on, with the moment that it carries.
+    fn hold_alone(&mut self, gone: &WeldModel) {
+        for g in self.state.grips.iter_mut().map(|(_, g)| g).filter(|g| g.hold == Hold::Clamp) {
+            let member = gone.members.iter().find(|m| (m.rod, m.particle) == (g.rod, g.index));
+            if let Some(side) = member.and_then(|m| m.before.or(m.after)) {
+                for pose in [&mut g.taken_pose, &mut g.pose, &mut g.target] {
+                    pose.orientation = (pose.orientation * side.section).normalize();
+                }
+                g.rest_half = side.rest_half;
+            }
+        }
     }
 
     /// The weld at a particle of a thread, such as the seam of a closed one.
     pub fn weld_at(&self, rod: Handle<Rod>, particle: u32) -> Result<Option<Handle<Weld>>, Error> {
         let r = self.model.rods.get(rod).ok_or(ROD)?;
-        crate::model::grip::Place::Particle(particle).validate("weld", &self.model, r)?;
+        Place::Particle(particle).validate("weld", &self.model, r)?;
         Ok(self.model.weld_of[(r.first + particle) as usize].map(|slot| self.model.welds.handle(slot)))
     }
 
@@ -365,16 +395,15 @@ impl World {
         let (position, orientation, velocity, spin) = match spec.hold {
             Hold::Pin => (state.position[i], DQuat::IDENTITY, state.velocity[i], DVec3::ZERO),
             Hold::Clamp => {
-                let before = (index > 0).then(|| i - 1);
-                let after = (index < n).then_some(i);
                 // Rest rotation over half an element: half that of the joint here, or of the nearest joint at an end.
                 let joint = if n < 2 { None } else { Some((rod.first + index.clamp(1, n - 1)) as usize) };
                 if let Some(j) = joint {
                     rest_half = crate::math::half(self.model.rest_half[j]);
                 }
                 let welded = self.model.weld_of[i].map(|w| state.weld_orientation[w as usize]);
-                let q = crate::step::clamp_orientation(before.map(|e| state.orientation[e]), after.map(|e| state.orientation[e]), rest_half);
-                (state.position[i], welded.unwrap_or(q), state.velocity[i], state.angular_velocity[after.or(before).unwrap_or(i)])
+                let (before, after) = ((index > 0).then(|| state.orientation[i - 1]), (index < n).then(|| state.orientation[i]));
+                let q = welded.unwrap_or_else(|| crate::step::clamp_orientation(before, after, rest_half));
+                (state.position[i], q, state.velocity[i], state.angular_velocity[if index < n { i } else { i - 1 }])
             }
             Hold::Jaw => {
                 let (a, b, q) = (state.position[i], state.position[i + 1], state.orientation[i]);
@@ -496,17 +525,16 @@ impl World {
         if model.weld_of[if spec.at_end { e + 1 } else { e }].is_some() {
             return Err(Error::invalid("reel", "at_end", spec.at_end, "an end that is not welded"));
         }
-        let alike = rod.elements().all(|k| model.section[k] == model.section[e] && model.rest_half[k] == DQuat::IDENTITY);
-        if rod.n_elements < 2 || !alike {
+        if !crate::reel::suits(model, rod) {
             return Err(Error::invalid("reel", "rod", spec.rod, "a thread of two elements or more, of one section, straight at rest"));
         }
         let jaw = |g: &GripState| g.rod == spec.rod.index && g.hold == Hold::Jaw && (rod.first + g.index) as usize == e;
         if state.grips.iter().any(|(_, g)| jaw(g)) {
             return Err(Error::invalid("reel", "at_end", spec.at_end, "an end whose last element no jaw holds"));
         }
-        let length = model.rest_length[e];
+        let nominal = model.rest_length[e];
         self.state.interrupt(Onset::Unknown);
-        let reel = ReelState { rod: spec.rod.index, at_end: spec.at_end, law: spec.law, supply: spec.supply, nominal: length, length, fed: 0.0, added: 0 };
+        let reel = ReelState { rod: spec.rod.index, at_end: spec.at_end, law: spec.law, supply: spec.supply, nominal, fed: 0.0, added: 0 };
         Ok(self.state.reels.insert(reel))
     }
 
@@ -614,7 +642,8 @@ impl World {
         self.step_with(dt, &mut |_| {})
     }
 
-    /// The same; `observe` sees every accepted substep (an audit, a recorder).
+    /// The same; `observe` sees every accepted substep (an audit, a recorder), and once more the state before one for which elements at a reel were
+    /// cut or joined.
     pub fn step_with(&mut self, dt: f64, observe: &mut dyn FnMut(View<'_>)) -> StepReport {
         let start = self.state.time;
         let mut report = StepReport { time: start, ..StepReport::default() };
@@ -738,7 +767,9 @@ impl World {
         }
         for (_, l) in s.loads.iter() {
             let rod = self.model.rods.at(l.rod).ok_or("a load is on a thread that is not here")?;
-            if self.validate_load(&l.kind, rod).is_err() {
+            // What is on a reel lies before the start or beyond the end.
+            let on_reel = matches!(l.kind, LoadKind::Point { place: Place::Arc(s), .. } | LoadKind::Mass { place: Place::Arc(s), .. } if s.is_finite());
+            if l.kind.validate().is_err() || !on_reel && self.validate_load(&l.kind, rod).is_err() {
                 return Err("a load is out of range");
             }
         }

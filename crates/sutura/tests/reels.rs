@@ -187,5 +187,70 @@ fn what_cannot_be_reeled_is_said() {
     let (material, radius) = t1();
     let ring = world.insert_rod(&RodSpec::ring(DVec3::X, DVec3::Z, DVec3::X * 0.01, 30, radius, material)).unwrap();
     assert_eq!(field(world.insert_reel(&ReelSpec { rod: ring, ..spec(true, ReelLaw::Rate(0.1)) })), "at_end");
+    // Nor is an end at a reel welded.
+    let (tail, tail_radius) = t1();
+    let at = world.rod(rod).unwrap().positions()[50];
+    let tail = world.insert_rod(&RodSpec::straight(at, at + DVec3::X * 0.01, 10, tail_radius, tail)).unwrap();
+    assert!(world.insert_weld(&sutura::WeldSpec::new(vec![(rod, Place::End), (tail, Place::Start)])).is_err());
     settle(&mut World::new(quiet()).unwrap(), 0.1, 1.0, 2.0);
+}
+
+#[test]
+fn a_snapshot_of_elements_all_alike_is_taken_up_with_all_joints() {
+    // Lengths and rates are powers of two: after eight substeps there is one element more, of the same length as all others.
+    for at_end in [false, true] {
+        let build = || {
+            let (material, radius) = t1();
+            let mut world = World::new(Settings { substep: 1.0 / 256.0, ..Settings::default() }).unwrap();
+            let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (10.0 / 1024.0), 10, radius, material)).unwrap();
+            let place = if at_end { Place::End } else { Place::Start };
+            world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
+            world.insert_reel(&ReelSpec { rod, at_end, law: ReelLaw::Rate(1.0 / 32.0), supply: None }).unwrap();
+            (world, rod)
+        };
+        let ((mut world, rod), (mut twin, _)) = (build(), build());
+        (0..8).for_each(|_| drop(world.step(1.0 / 256.0)));
+        let lengths = world.rod(rod).unwrap().rest_lengths().to_vec();
+        assert_eq!(lengths, [1.0 / 1024.0; 11]);
+        twin.restore(&world.snapshot()).unwrap();
+        world.step(1.0 / 256.0);
+        twin.step(1.0 / 256.0);
+        assert_eq!(world.state_hash(), twin.state_hash());
+    }
+}
+
+#[test]
+fn what_is_drawn_onto_the_reel_comes_off_again_and_the_snapshot_between_is_taken() {
+    for at_end in [false, true] {
+        let (mut world, rod, _, reel) = hanging(at_end, ReelLaw::Rate(-0.05), Stretch::Elastic);
+        // A mass 5 mm from the reel.
+        let place = Place::Arc(if at_end { 0.045 } else { 0.005 });
+        world.insert_load(&sutura::LoadSpec { rod, kind: sutura::LoadKind::Mass { place, mass: 1e-3, inertia: DVec3::ZERO } }).unwrap();
+        let pulled = |world: &World| {
+            let view = world.rod(rod).unwrap();
+            // Where tension jumps by the weight, from the reel.
+            let tensions: Vec<f64> = (0..view.n_elements()).map(|e| view.tension(if at_end { view.n_elements() - 1 - e } else { e })).collect();
+            tensions.iter().position(|t| *t < 5e-3).unwrap()
+        };
+        world.step(0.2);
+        assert_eq!(pulled(&world), 0);
+        let saved = world.snapshot();
+        world.restore(&saved).unwrap();
+        world.set_reel(reel, ReelLaw::Rate(0.05)).unwrap();
+        world.step(0.4);
+        world.set_reel(reel, ReelLaw::Rate(0.0)).unwrap();
+        world.step(1.0);
+        let (at, view) = (pulled(&world), world.rod(rod).unwrap());
+        let fed: f64 = (0..at).map(|e| view.rest_lengths()[if at_end { view.n_elements() - 1 - e } else { e }]).sum();
+        assert!((fed - 0.015).abs() < 1.5e-3, "{at_end}: {fed}");
+    }
+}
+
+#[test]
+fn a_rate_beyond_all_proportion_feeds_a_thousand_elements_a_substep() {
+    let (mut world, rod, _, reel) = hanging(true, ReelLaw::Rate(100.0), Stretch::Elastic);
+    world.set_settings(Settings { substep: 1e9, halvings: 0, ..Settings::default() }).unwrap();
+    world.step(1e9);
+    world.step(1e9);
+    assert!(world.reel_fed(reel).unwrap() <= 2.0 && world.rod(rod).unwrap().n_elements() <= 1100);
 }

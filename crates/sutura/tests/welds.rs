@@ -326,3 +326,67 @@ fn a_snapshot_holds_welds_and_dropping_scratch_changes_no_bit() {
     assert_eq!(a.state_hash(), b.state_hash());
     assert!(World::default().restore(&saved).is_err());
 }
+
+#[test]
+fn what_a_clamp_holds_stays_as_it_is_when_something_is_welded_to_it_and_when_it_comes_off() {
+    // A thread that its weight bends, held by a clamp at its start or its middle; another one, hanging straight down, is welded on there.
+    for (place, particle) in [(Place::Start, 0), (Place::Particle(10), 10)] {
+        let (material, radius) = t1();
+        let mut world = World::new(Settings { linear_damping: 0.99, ..Settings::default() }).unwrap();
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
+        world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
+        settle(&mut world, 0.05, 1e-6, 60.0);
+        let shape = world.rod(rod).unwrap().positions().to_vec();
+        let moved = |world: &World, shape: &[DVec3]| {
+            let x = world.rod(rod).unwrap().positions().iter().zip(shape).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+            x / 0.1
+        };
+        assert!(shape[20].z < -5e-4);
+        let branch = world.insert_rod(&RodSpec::straight(shape[particle], shape[particle] - DVec3::Z * 0.02, 8, radius, material)).unwrap();
+        let weld = world.insert_weld(&WeldSpec::new(vec![(rod, place), (branch, Place::Start)])).unwrap();
+        settle(&mut world, 0.05, 1e-6, 60.0);
+        assert!(moved(&world, &shape) < 1e-6, "{place:?}: {}", moved(&world, &shape));
+        world.remove_weld(weld).unwrap();
+        let before = world.rod(rod).unwrap().positions().to_vec();
+        // The branch falls off.
+        world.step(1.0);
+        assert!(moved(&world, &before) < 1e-6, "{place:?}: {}", moved(&world, &before));
+    }
+    // A branch at a right angle, held by its own end: it keeps its direction when what it grew from is cut off or goes.
+    for removed in [false, true] {
+        let (material, radius) = t1();
+        let mut world = World::new(quiet()).unwrap();
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
+        let branch = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::Y * 0.02, 8, radius, material)).unwrap();
+        let weld = world.insert_weld(&WeldSpec::new(vec![(rod, Place::Start), (branch, Place::Start)])).unwrap();
+        world.insert_grip(&GripSpec::at_once(branch, Place::Start, Hold::Clamp)).unwrap();
+        world.step(0.1);
+        if removed {
+            world.remove_rod(rod).unwrap()
+        } else {
+            world.remove_weld(weld).unwrap()
+        }
+        world.step(1.0);
+        let end = *world.rod(branch).unwrap().positions().last().unwrap();
+        assert!((end - DVec3::Y * 0.02).length() < 1e-9, "{end}");
+    }
+}
+
+#[test]
+fn threads_that_cross_at_a_weld_are_both_at_rest_there() {
+    // Straight threads whose middles are joined at any angle stay straight, and the same in a bent one whose rest shape is an arc.
+    for angle in [0.4, 1.5] {
+        let (material, radius) = t1();
+        let mut world = World::new(quiet()).unwrap();
+        let turn = DQuat::from_rotation_z(angle);
+        let a = world.insert_rod(&RodSpec::straight(DVec3::NEG_X * 0.02, DVec3::X * 0.02, 20, radius, material.clone())).unwrap();
+        let bow: Vec<DVec3> = (-10..=10).map(|i| turn * DVec3::new(2e-3 * f64::from(i), 2e-5 * f64::from(i * i), 0.0)).collect();
+        let b = world.insert_rod(&RodSpec { rest: RestShape::AsInserted, ..RodSpec::new(bow, radius, material) }).unwrap();
+        world.insert_weld(&WeldSpec::new(vec![(a, Place::Particle(10)), (b, Place::Particle(10))])).unwrap();
+        let before: Vec<DVec3> = world.view().rods().flat_map(|r| r.positions().to_vec()).collect();
+        world.step(1.0);
+        let now = world.view().rods().flat_map(|r| r.positions().to_vec());
+        let off = now.zip(&before).map(|(x, y)| (x - *y).length()).fold(0.0, f64::max);
+        assert!(off < 1e-9, "{angle}: {off:e}");
+    }
+}

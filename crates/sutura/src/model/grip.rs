@@ -137,6 +137,13 @@ pub enum LoadKind {
 }
 
 impl LoadKind {
+    /// Where it acts, if at one place.
+    pub(crate) fn place_mut(&mut self) -> Option<&mut Place> {
+        match self {
+            LoadKind::Point { place, .. } | LoadKind::Mass { place, .. } => Some(place),
+            LoadKind::Uniform { .. } => None,
+        }
+    }
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let finite = |field: &str, v: DVec3| if v.is_finite() { Ok(()) } else { Err(Error::invalid("load", field, v, "a finite vector")) };
         match self {

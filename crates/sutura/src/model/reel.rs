@@ -25,7 +25,8 @@ pub struct ReelSpec {
 /// What a reel does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ReelLaw {
-    /// Feeds length in at this rate \[m/s\]; draws it back where the rate is negative, down to two elements.
+    /// Feeds length in at this rate \[m/s\], in a substep no more than a thousand elements; draws it back where the rate is negative, down to two
+    /// elements.
     Rate(f64),
     /// Gives off length where the tension at the end would be higher than this \[N\], > 0, as a spool with a brake. Not for inextensible threads.
     Brake(f64),

@@ -482,6 +482,6 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
             });
         }
     }
-    contacts.sort_unstable_by(|a, b| (a.shape, a.element).cmp(&(b.shape, b.element)).then(a.s.total_cmp(&b.s)));
+    ShapeContact::sort(&mut contacts);
     state.shape_contacts = contacts;
 }

@@ -374,6 +374,6 @@ pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
             sliding,
         });
     }
-    contacts.sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
+    ThreadContact::sort(&mut contacts);
     state.thread_contacts = contacts;
 }

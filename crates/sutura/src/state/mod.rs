@@ -95,9 +95,8 @@ pub(crate) struct ReelState {
     pub law: ReelLaw,
     /// Length that is left on it \[m\].
     pub supply: Option<f64>,
-    /// Length of the element there when the reel was set up, and rest length of the element there now \[m\].
+    /// Length of the element there when the reel was set up \[m\].
     pub nominal: f64,
-    pub length: f64,
     /// Length fed in less length drawn back since then \[m\], and elements added less those taken away.
     pub fed: f64,
     pub added: i32,
@@ -142,6 +141,20 @@ pub(crate) struct ShapeContact {
     pub drift: DVec3,
     /// Whether it slid.
     pub sliding: bool,
+}
+
+impl ThreadContact {
+    /// Puts contacts in the order in which they are looked up.
+    pub(crate) fn sort(contacts: &mut [Self]) {
+        contacts.sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
+    }
+}
+
+impl ShapeContact {
+    /// Puts contacts in the order in which they are looked up.
+    pub(crate) fn sort(contacts: &mut [Self]) {
+        contacts.sort_unstable_by(|x, y| (x.shape, x.element).cmp(&(y.shape, y.element)).then(x.s.total_cmp(&y.s)));
+    }
 }
 
 impl State {

@@ -6,12 +6,12 @@
 
 mod band;
 pub mod der;
-//pub mod pbd;
-//pub mod pber;
-//mod points;
+pub mod pbd;
+pub mod pber;
+mod points;
 pub mod scene;
 
 pub use der::Der;
-//pub use pbd::Pbd;
-//pub use pber::Pber;
+pub use pbd::Pbd;
+pub use pber::Pber;
 pub use scene::{Hold, Invalid, Pose, Rod, Scene, Shape, Solver};

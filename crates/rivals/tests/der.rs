@@ -14,13 +14,9 @@ use sutura_rivals::{Der, Hold, Pose, Rod, Scene, Shape, Solver};
 fn cantilever(n: usize, load: f64, weight: f64) -> (f64, f64) {
     let length = 0.05;
     let edge = length / (n as f64 - 0.5);
-    let mut rod = thread(line(n, edge, DVec3::X));
+    let rod = thread(line(n, edge, DVec3::X));
     let ei = rod.young * rod.second_moment();
-    // A millionth of the stretch of a real thread: the elastica does not stretch. EA acts nowhere else.
     let gravity = DVec3::NEG_Z * weight * ei / length.powi(3) / (rod.density * rod.area());
-    if weight == 0.0 {
-        rod.density = 1.0;
-    }
     let at = DQuat::from_rotation_y(PI / 2.0);
     let scene = Scene {
         first: Hold::Clamp(Box::new(move |_| Pose::new(DVec3::ZERO, at))),
@@ -29,7 +25,7 @@ fn cantilever(n: usize, load: f64, weight: f64) -> (f64, f64) {
         ..Scene::of(rod)
     };
     let mut der = Der::new(scene, Settings { iterations: 500, ..Settings::default() }).unwrap();
-    // Steps this long forget inertia: each ends at rest but for a part in 10^4 or so of the way.
+    // Steps this long forget inertia. Each jumps to rest, which takes Newton's method more iterations than a step of a frame.
     for _ in 0..12 {
         der.step(10.0);
     }
@@ -143,7 +139,7 @@ fn localized_helical_buckling() {
     for (t, m) in &errors {
         assert!(t.abs() < 0.02 && m.abs() < 0.005, "{errors:?}");
     }
-    assert!(errors[1].0.abs() < 0.4 * errors[0].0.abs(), "{errors:?}");
+    assert!(errors[1].0.abs() < 0.3 * errors[0].0.abs() && errors[1].1.abs() < 0.3 * errors[0].1.abs(), "not of second order: {errors:?}");
 }
 
 /// Michell: a naturally straight rod bent to a ring and turned loses its plane at 2 pi sqrt 3 EI / GJ; a ring of n edges stands 34 / n^2 more.
@@ -152,7 +148,7 @@ fn localized_helical_buckling() {
 fn michell(n: usize, share: f64) -> f64 {
     // n - 1 edges close the ring; the last edge lies on the first.
     let round = n as f64 - 1.0;
-    let edge = 2e-3;
+    let edge = 0.12 / round;
     let radius = 0.5 * edge / (PI / round).sin();
     let rod = thread(line(n, edge, DVec3::X));
     let rod_ei = rod.young * rod.second_moment();
@@ -164,7 +160,7 @@ fn michell(n: usize, share: f64) -> f64 {
     let scene = Scene {
         first: Hold::Clamp(Box::new(move |_| Pose::new(p, first))),
         last: Hold::Clamp(Box::new(move |t| Pose::new(q, last * DQuat::from_rotation_z(turn * (t / 20.0).min(1.0))))),
-        loads: vec![(n / 3, DVec3::Z * 2e-7)],
+        loads: vec![(n / 3, DVec3::Z * 1e-5 * rod_ei / (radius * radius))],
         ..Scene::of(Rod { start, ..rod })
     };
     let mut der = Der::new(scene, Settings::default()).unwrap();
@@ -179,12 +175,14 @@ fn michell(n: usize, share: f64) -> f64 {
 
 #[test]
 fn michell_ring() {
-    for n in [32, 64, 128] { for k in [0.9,0.96,0.98,0.99,0.995,1.0,1.005, 1.01,1.02,1.04,1.08] { println!("n {n} {k} {}", michell(n, k)); } }
-    let n = 64;
-    let [below, above] = [0.98, 1.02].map(|m| michell(n, m));
-    println!("Michell, {n} edges: out of plane {below:.2e} at 0.98, {above:.2e} at 1.02");
-    assert!(below < 0.01, "{below}");
-    assert!(above > 0.1, "{above}");
+    for n in [32, 64] {
+        let limit = 1.0 + 34.0 / f64::from(n as u32 - 1).powi(2);
+        let [below, above] = [0.99, 1.01].map(|m| michell(n, m * limit));
+        println!("Michell, {n} edges: torque {below:.4} at 0.99, {above:.4} at 1.01 of the limit {limit:.4}");
+        // Below it, all of the turn is twist.
+        assert!((below / (0.99 * limit) - 1.0).abs() < 1e-4, "{n}: {below}");
+        assert!(above < 0.5, "{n}: {above}");
+    }
 }
 
 /// A helix that is its own rest shape has no forces: it stays to rounding, also when it is turned in space and its reference frames are not
@@ -204,7 +202,8 @@ fn a_natural_helix_stays() {
     let line = Shape::straight(DVec3::ZERO, DVec3::X * der.rest_lengths().iter().sum::<f64>(), 60, DVec3::Y);
     let rest = support::helix(60);
     let far = rest.points[0].distance(rest.points[60]);
-    let mut der = Der::new(Scene { drag: 5.0, ..Scene::of(Rod { start: line, rest, ..thread(support::line(60, 1e-3, DVec3::X)) }) }, Settings::default()).unwrap();
+    let mut der =
+        Der::new(Scene { drag: 5.0, ..Scene::of(Rod { start: line, rest, ..thread(support::line(60, 1e-3, DVec3::X)) }) }, Settings::default()).unwrap();
     for _ in 0..240 {
         der.step(1.0 / 60.0);
     }
@@ -228,7 +227,6 @@ fn free_fall_and_momentum() {
     let (h, steps) = (1.0 / 3000.0, 300);
     for _ in 0..steps {
         der.step(h);
-
     }
     let m = f64::from(steps);
     let fallen = v * (m * h) + g * (h * h * m * (m + 1.0) / 2.0);
@@ -259,7 +257,7 @@ fn frequency_of_a_cantilever() {
         der.step(h);
         let x = der.positions()[n].x;
         if before < 0.0 && x >= 0.0 || before > 0.0 && x <= 0.0 {
-            crossings.push((i as f64 + before / (before - x)) * h);
+            crossings.push((f64::from(i) + before / (before - x)) * h);
         }
         before = x;
     }

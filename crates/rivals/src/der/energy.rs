@@ -90,7 +90,7 @@ impl Config {
             self.reference_twist[i] += libm::atan2(before.cross(now).dot(b), before.dot(now));
         }
     }
-    /// Takes the vertices and angles of `to` plus `scale` times the step `d`; reference frames are transported from those of `to`.
+    /// Takes the vertices and angles of `from` plus `scale` times the step `d`; reference frames are transported from those of `from`.
     pub fn set_moved(&mut self, from: &Config, d: &[f64], scale: f64) {
         for i in 0..self.x.len() {
             self.x[i] = from.x[i] + DVec3::from_slice(&d[4 * i..4 * i + 3]) * scale;
@@ -183,9 +183,7 @@ impl Elastic {
     }
     /// Twisting moment at each inner vertex \[N m\].
     pub fn twisting(&self, c: &Config) -> Vec<f64> {
-        (0..self.joint.len())
-            .map(|i| self.stiffness[2] * (c.theta[i + 1] - c.theta[i] + c.reference_twist[i] - self.tau[i]) / self.joint[i])
-            .collect()
+        (0..self.joint.len()).map(|i| self.stiffness[2] * (c.theta[i + 1] - c.theta[i] + c.reference_twist[i] - self.tau[i]) / self.joint[i]).collect()
     }
     /// Tension of each edge \[N\].
     pub fn tensions(&self, c: &Config) -> Vec<f64> {
@@ -288,7 +286,7 @@ impl Joint {
     /// What curvature `which` is measured with, and what that becomes when it turns about its edge.
     fn directors(&self, which: usize) -> (DVec3, DVec3) {
         let [m1, m2] = if which < 2 { [self.m[0], self.m[1]] } else { [self.m[2], self.m[3]] };
-        if which % 2 == 0 { (m2, -m1) } else { (-m1, -m2) }
+        if which.is_multiple_of(2) { (m2, -m1) } else { (-m1, -m2) }
     }
     /// Of `kappa` = kb . (de + df), with de fixed in the frame of e and df in that of f; `ue` and `uf` are these turned by a right angle.
     fn curvature_gradient(&self, kappa: f64, de: DVec3, df: DVec3, ue: DVec3, uf: DVec3) -> [f64; 8] {
@@ -370,7 +368,8 @@ mod tests {
 
     /// A crooked rod of five edges, bent and twisted, with a rest shape of its own; energies of order one.
     fn crooked() -> (Elastic, Config) {
-        let points = |seed: usize| (0..6).map(|i| DVec3::new(i as f64 + 0.3 * noise(seed + i), 0.4 * noise(seed + 10 + i), 0.4 * noise(seed + 20 + i))).collect();
+        let points =
+            |seed: usize| (0..6).map(|i| DVec3::new(i as f64 + 0.3 * noise(seed + i), 0.4 * noise(seed + 10 + i), 0.4 * noise(seed + 20 + i))).collect();
         let start = Shape::untwisted(points(3), DVec3::Y);
         let rest = Shape::untwisted(points(40), DVec3::Y);
         let mut config = Config::new(&start);
@@ -425,7 +424,12 @@ mod tests {
     #[test]
     fn energies_are_those_of_theory() {
         let n = 100;
-        let arc: Vec<DVec3> = (0..=n).map(|i| { let a = i as f64 / n as f64; DVec3::new(libm::sin(a), 1.0 - libm::cos(a), 0.0) }).collect();
+        let arc: Vec<DVec3> = (0..=n)
+            .map(|i| {
+                let a = i as f64 / n as f64;
+                DVec3::new(libm::sin(a), 1.0 - libm::cos(a), 0.0)
+            })
+            .collect();
         let rod = Rod {
             start: Shape::untwisted(arc, DVec3::Z),
             rest: Shape::straight(DVec3::ZERO, DVec3::X, n, DVec3::Z),

@@ -17,7 +17,7 @@
 //! which is 2 tan (angle / 2) / l along the axis of the rotation from a to b (appendix, section 2). The last is one constraint with three
 //! components: the correction is - W J^T (J W J^T)^-1 (s Omega - s Omega_rest) with stiffness numbers s in \[0, 1\] for bending about d1, d2 and
 //! for twist. The derivatives are our own: Omega by the rotations of both frames, these by the points. A sweep goes over the edges and
-//! joints from both ends in turn, as in the source, so that neither end comes first.
+//! joints from both ends in turn, the source's bilateral order, so that neither end comes first.
 //!
 //! Ours, where the source leaves a choice: the ghost point stands half an edge away and has the mass of its edge, so that the whole has twice
 //! the mass of the rod; loads on vertices (forces) act on the vertices' own mass. Gravity may act on ghost points or not: with it free fall is
@@ -25,10 +25,11 @@
 //! micrometers), and one that falls freely turns about its axis.
 //!
 //! What the numbers mean: where constraints cannot all be met, as in a rod that is bent and twisted by its ends, the shape is (for small numbers,
-//! many sweeps) that of least sum of s Omega^T (J W J^T)^-1 Omega. For a straight rod of equal edges inside, the twisting stiffness of that is
-//! 0.6 of the bending stiffness at equal numbers. Beside a held edge, where less can move, a joint is about twice as stiff in twist, and its
-//! matrix couples twist with bending: a straight rod turned by 3 radians in 20 edges leaves its axis by a tenth of an edge. Large numbers leave
-//! less in the joints that a sweep comes to last. A ghost point beside the plane in which a rod is bent draws it out of the plane.
+//! many sweeps) that of least sum of s Omega^T (J W J^T)^-1 Omega. For straight equal edges of length L and points of mass m, J W J^T is 6 / (m L^4)
+//! in bending and 10 / (m L^4) in twist, so that at equal numbers the rod is 0.6 times as stiff in twist as in bending. At the joint of a held
+//! edge it is 1 and 5 (six times and twice as stiff), at the next 5 and 9; there it also couples twist with bending, and a straight rod turned
+//! by 3 radians in 20 edges leaves its axis by a tenth of an edge. Large numbers leave less in the joints that a sweep comes to last. A ghost
+//! point beside the plane in which a rod is bent draws it out of the plane.
 //!
 //! Left out: coupling with triangles and rigid bodies. Moduli do nothing: stiffness is in the numbers, which mean what iterations, substeps and
 //! the number of edges make of them.
@@ -307,6 +308,20 @@ mod tests {
                 let got = by_turn * turns[k] * axis;
                 assert!((wanted - got).length() < 1e-8, "point {k}: {got} for {wanted}");
             }
+        }
+    }
+
+    /// J W J^T of straight equal edges of length one and points of mass one, inside, beside a held edge, and one further.
+    #[test]
+    fn stiffness_of_straight_joints() {
+        let at = |x: f64| DVec3::X * x;
+        let (a, b) = (Frame::new(at(0.0), at(1.0), at(0.5) + DVec3::Y * 0.5), Frame::new(at(1.0), at(2.0), at(1.5) + DVec3::Y * 0.5));
+        let (ta, tb, by_turn) = (a.turns(), b.turns(), darboux(&a, &b, 1.0).1);
+        let turns = [-ta[0], tb[0] - ta[1], tb[1], -ta[2], tb[2]];
+        for (w, bend, twist) in [([1.0; 5], 6.0, 10.0), ([0.0, 0.0, 1.0, 0.0, 1.0], 1.0, 5.0), ([0.0, 1.0, 1.0, 1.0, 1.0], 5.0, 9.0)] {
+            let system: DMat3 = (0..5).map(|k| by_turn * turns[k] * (by_turn * turns[k]).transpose() * w[k]).sum();
+            let diagonal = DVec3::new(system.x_axis.x, system.y_axis.y, system.z_axis.z);
+            assert!((diagonal - DVec3::new(bend, bend, twist)).length() < 1e-12, "{w:?}: {system}");
         }
     }
 

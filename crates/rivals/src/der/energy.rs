@@ -1,7 +1,7 @@
 //! The elastic energy of a discrete rod, its gradient and its Hessian.
 //!
 //! Source: Bergou, Wardetzky, Robinson, Audoly, Grinspun, "Discrete elastic rods", SIGGRAPH 2008: curvature binormal (eq. 1), energies of
-//! bending and twisting (section 4.2), parallel transport along the rod (4.2.2). From Bergou, Audoly, Vouga, Wardetzky, Grinspun, "Discrete
+//! bending and twisting, parallel transport along the rod. From Bergou, Audoly, Vouga, Wardetzky, Grinspun, "Discrete
 //! viscous threads", SIGGRAPH 2010: stretching as an energy, reference frames transported in time, and the derivatives of curvature and twist.
 //!
 //! With e, f the edges that meet at a vertex, t_e, t_f their directions, chi = 1 + t_e . t_f, l half the sum of their rest lengths:

@@ -24,7 +24,7 @@ fn cases(n: u32) -> ProptestConfig {
 
 /// The numbers that a scene is drawn from.
 fn numbers() -> impl Strategy<Value = Vec<f64>> {
-    prop::collection::vec(0.0..1.0f64, 250)
+    prop::collection::vec(0.0..1.0f64, 300)
 }
 
 fn kinds() -> impl Strategy<Value = Kind> {

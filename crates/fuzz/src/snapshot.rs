@@ -54,7 +54,9 @@ fn take_up(which: usize, bytes: &[u8]) {
         }
     }
     let again = world.snapshot();
-    assert!(world.restore(&again).is_ok(), "the world does not take its own snapshot");
+    if let Err(e) = world.restore(&again) {
+        panic!("the world does not take its own snapshot: {e}");
+    }
 }
 
 /// A thread held at its start.

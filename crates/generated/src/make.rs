@@ -1,12 +1,12 @@
 //! Draws scenes: sensible ones, of threads as they are used, and absurd ones, of numbers that are finite and nothing else.
 
 use crate::draw::Draw;
-use crate::scene::{Act, Held, Scene};
+use crate::scene::{Act, Held, Joined, Reeled, Scene, elements};
 use core::f64::consts::{FRAC_PI_2, TAU};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Along, Drive, Friction, Geometry, Hold, LoadKind, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion,
-    ShapeSpec, Shear, Stretch, transported_frames,
+    Along, Closure, Drive, Friction, Geometry, Hold, Integrator, LoadKind, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section,
+    Settings, ShapeMotion, ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
 };
 
 /// Which sensible scenes.
@@ -99,6 +99,7 @@ fn settings(d: &mut Draw, down: DVec3) -> Settings {
         friction: friction(d),
         // What is stuck takes twice the attempts for each.
         halvings: 6,
+        integrator: if d.chance(0.3) { Integrator::TrBdf2 } else { Integrator::ImplicitEuler },
         ..Settings::default()
     }
 }
@@ -119,6 +120,8 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
         settings: settings(d, down),
         frictions: vec![(0, 1, friction(d)), (1, 1, friction(d))],
         rods: Vec::new(),
+        welds: Vec::new(),
+        reels: Vec::new(),
         shapes: Vec::new(),
         grips: Vec::new(),
         loads: Vec::new(),
@@ -130,9 +133,13 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
     let mut height = 0.0;
     for number in 0..n_rods {
         let mut radius = d.log(0.15e-3, 0.4e-3);
-        let curve = Curve::draw(d, touching);
+        let mut curve = Curve::draw(d, touching);
         let n = d.whole(4, ((curve.length / (2.5 * radius)) as u32).min(30)) as usize;
-        let points = curve.points(n);
+        let closed = n >= 8 && d.chance(0.2);
+        let joined = number > 0 && !closed && d.chance(0.4);
+        // A thread that goes on from another one leaves it behind.
+        curve.kind = if joined { 0 } else { curve.kind };
+        let points = if closed { ring(curve.length, n) } else { curve.points(n) };
         let section = if d.chance(0.3) { flat_section(d, radius) } else { Section::Round };
         if let Some(half_width) = section.half_width() {
             radius = half_width;
@@ -146,7 +153,13 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
             Pose::new(DVec3::Y * (0.2 * number as f64), d.turn())
         };
         height += radius;
-        let mut spec = rod(&points, place, radius, material(d));
+        let parent = if joined { join(d, &mut scene, number, touching) } else { None };
+        let mut spec = rod(&points, parent.unwrap_or(place), radius, material(d));
+        if closed {
+            // The last point was for the last frame.
+            spec.centerline.pop();
+            spec.closure = Some(Closure { twist: d.signed() * 6.0 });
+        }
         spec.section = section;
         spec.surface = d.whole(0, 1);
         spec.stretch = if d.chance(0.4) { Stretch::Inextensible } else { Stretch::Elastic };
@@ -155,9 +168,13 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
             2 if curve.kind == 0 || curve.angle < 2.0 => RestShape::Straight,
             _ => {
                 let bend = d.vector(20.0);
-                RestShape::Given { lengths: None, darboux: Some(vec![bend; n - 1]) }
+                RestShape::Given { lengths: None, darboux: Some(vec![bend; n - usize::from(!closed)]) }
             }
         };
+        // Closed as it lies it would have its bend turned with the twist, from the end at which it is counted.
+        if closed && spec.rest == RestShape::AsInserted {
+            spec.rest = RestShape::Straight;
+        }
         if d.chance(0.2) {
             (spec.roll, spec.pretwist) = (d.even(0.0, 1.0), d.even(0.0, 3.0));
         }
@@ -169,7 +186,11 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
         if section == Section::Round && d.chance(0.2) {
             spec.material.plasticity = Some(Plasticity { yield_curvature: d.log(300.0, 50.0), yield_twist: d.log(300.0, 50.0), hardening: d.even(0.0, 0.5) });
         }
-        holds(d, &mut scene, number, n as u32, kind);
+        if !closed && !joined && !passive && d.chance(0.3) {
+            (spec.rest, spec.along, spec.roll, spec.pretwist) = (RestShape::Straight, Along::default(), 0.0, 0.0);
+            reels(d, &mut scene, number, spec.stretch);
+        }
+        holds(d, &mut scene, number, &spec, kind);
         loads(d, &mut scene, number, n as u32, passive, spec.radius);
         scene.rods.push(spec);
     }
@@ -200,20 +221,70 @@ fn flat_section(d: &mut Draw, radius: f64) -> Section {
     if d.chance(0.5) { Section::Ellipse(axes) } else { Section::Rectangle(axes.map(|x| 2.0 * x)) }
 }
 
+/// `n + 1` points around a circle of this length, the last one at the first.
+fn ring(length: f64, n: usize) -> Vec<DVec3> {
+    let at = |i: usize| {
+        let (sin, cos) = libm::sincos(TAU * (i % n) as f64 / n as f64);
+        DVec3::new(cos, sin, 0.0) * (length / TAU)
+    };
+    (0..=n).map(at).collect()
+}
+
+/// Joins the next thread, `number`, with its start to the end of the one before it, or to its middle where that is straight and far from all else; says
+/// where it begins.
+fn join(d: &mut Draw, scene: &mut Scene, number: usize, touching: bool) -> Option<Pose> {
+    let (from, before) = (number - 1, scene.rods.last()?);
+    if before.closure.is_some() || scene.reels.iter().any(|r| r.rod == from && r.at_end) {
+        return None;
+    }
+    let (x, n) = (&before.centerline, before.centerline.len() - 1);
+    let straight = (x[n] - x[0]).length() > 0.999 * crate::scene::length(before, x);
+    let (place, at, bend) =
+        if straight && !touching && d.chance(0.5) { (Place::Particle(n as u32 / 2), x[n / 2], 1.3) } else { (Place::End, x[n], d.even(0.0, 0.6)) };
+    // About the normal of the ground, or any axis across.
+    let along = (x[n] - x[n - 1]).normalize();
+    let axis = if touching { DVec3::Z } else { along.any_orthonormal_vector() };
+    let frame = DQuat::from_rotation_arc(DVec3::X, DQuat::from_axis_angle(axis, bend) * along).normalize();
+    let rest = if bend < 1.0 && d.chance(0.3) { WeldRest::Straight } else { WeldRest::AsInserted };
+    let until = if d.chance(0.2) && scene.frames > 8 { scene.frames / 2 } else { u32::MAX };
+    let mut places = vec![(from, place), (number, Place::Start)];
+    if d.chance(0.3) {
+        places.reverse();
+    }
+    scene.welds.push(Joined { places, rest, until });
+    Some(Pose::new(at, frame))
+}
+
+/// A reel at one end or both.
+fn reels(d: &mut Draw, scene: &mut Scene, rod: usize, stretch: Stretch) {
+    let law = |d: &mut Draw| {
+        let brake = d.chance(0.4) && stretch == Stretch::Elastic;
+        if brake { ReelLaw::Brake(d.log(0.2, 1e-3)) } else { ReelLaw::Rate(d.signed() * 0.05) }
+    };
+    let both = d.chance(0.3);
+    let first = d.chance(0.5);
+    for at_end in [false, true].into_iter().filter(|at_end| both || *at_end == first) {
+        let (law, later) = (law(d), if d.chance(0.4) { Some((scene.frames / 2, law(d))) } else { None });
+        let supply = if d.chance(0.3) { Some(d.even(0.3, 0.0)) } else { None };
+        scene.reels.push(Reeled { rod, at_end, law, later, supply });
+    }
+}
+
 /// A grip that holds from the beginning and stays where it is.
 fn still(rod: usize, place: Place, hold: Hold) -> Held {
     Held { rod, place, hold, drive: Drive::Pose, ramp: 0.0, from: 0, until: u32::MAX, velocity: DVec3::ZERO, spin: DVec3::ZERO }
 }
 
 /// What holds a thread at its ends, and how it moves.
-fn holds(d: &mut Draw, scene: &mut Scene, rod: usize, n: u32, kind: Kind) {
-    let hold = |d: &mut Draw| [Hold::Pin, Hold::Clamp, Hold::Jaw][d.whole(0, 2) as usize];
-    let (start, end) = (d.chance(0.7), d.chance(0.3) && n > 3);
-    if start {
-        scene.grips.push(still(rod, Place::Start, hold(d)));
-    }
-    if end {
-        scene.grips.push(still(rod, Place::End, hold(d)));
+fn holds(d: &mut Draw, scene: &mut Scene, rod: usize, spec: &RodSpec, kind: Kind) {
+    let joined = |place: Place| scene.welds.iter().any(|w| w.places.contains(&(rod, place)));
+    let reeled = [false, true].map(|at_end| scene.reels.iter().any(|r| r.rod == rod && r.at_end == at_end));
+    let (start, end) = (d.chance(0.7) || reeled[0], d.chance(0.3) && elements(spec) > 3 || reeled[1]);
+    // A weld is held as the place of one of its threads only, and a seam once.
+    let places = [(start && !joined(Place::Start), Place::Start, reeled[0]), (end && spec.closure.is_none(), Place::End, reeled[1])];
+    for (_, place, reeled) in places.into_iter().filter(|p| p.0) {
+        let hold = [Hold::Pin, Hold::Clamp, Hold::Jaw][d.whole(0, if reeled { 1 } else { 2 }) as usize];
+        scene.grips.push(still(rod, place, hold));
     }
     if matches!(kind, Kind::FreePassive | Kind::Touching) {
         return;
@@ -301,6 +372,10 @@ pub fn absurd(d: &mut Draw) -> Scene {
     scene.frames = d.whole(3, 8);
     // Being stuck takes twice the attempts for each halving allowed.
     scene.settings.halvings = if d.chance(0.005) { 12 } else { d.whole(0, 3) };
+    // An element may be so short that a thousand of them are fed in every substep.
+    for reel in &mut scene.reels {
+        reel.supply = reel.supply.or(Some(2.0));
+    }
     for _ in 0..d.whole(1, 4) {
         make_absurd(d, &mut scene);
     }
@@ -315,7 +390,7 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
     let when = d.whole(0, frames - 1);
     let rod = &mut scene.rods[number];
     let n = rod.centerline.len() - 1;
-    match d.whole(0, 35) {
+    match d.whole(0, 41) {
         0 => rod.radius *= x,
         1 => rod.material.young_modulus *= x,
         2 => rod.material.density *= x,
@@ -388,6 +463,32 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
             let other = Settings { gravity: d.vector(x), substep: scene.settings.substep * d.log(0.3, 30.0), ..scene.settings.clone() };
             scene.acts.push((when, Act::Settings(other)));
         }
+        36 => rod.closure = if d.chance(0.5) { None } else { Some(Closure { twist: d.signed() * x }) },
+        37 => {
+            let spec = RodSpec { along: Along::default(), roll: 0.0, pretwist: 0.0, rest: RestShape::Straight, ..rod.clone() };
+            *rod = spec;
+            let law = if d.chance(0.5) { ReelLaw::Rate(d.signed() * x.min(100.0)) } else { ReelLaw::Brake(x) };
+            let later = Some((when, if d.chance(0.5) { ReelLaw::Rate(-x.min(100.0)) } else { ReelLaw::Brake(wild(d)) }));
+            scene.reels.push(Reeled { rod: number, at_end: d.chance(0.5), law, later, supply: Some(d.even(3.0, 0.0)) });
+        }
+        38 => {
+            for reel in &mut scene.reels {
+                reel.law = if d.chance(0.5) { ReelLaw::Rate(d.signed() * wild(d).min(100.0)) } else { ReelLaw::Brake(wild(d)) };
+            }
+        }
+        // A thread onto itself, its twin, or another one, wherever they lie.
+        39 => {
+            let other = d.whole(0, n_rods as u32 - 1) as usize;
+            let place = |d: &mut Draw| [Place::Start, Place::End, Place::Particle(n as u32 / 2), Place::Particle(1)][d.whole(0, 3) as usize];
+            let places = vec![(number, place(d)), (other, place(d))];
+            let shift = scene.rods[number].centerline[0] - scene.rods[other].centerline[0];
+            if d.chance(0.7) {
+                scene.rods[other].centerline.iter_mut().for_each(|p| *p += shift);
+            }
+            scene.welds.push(Joined { places, rest: if d.chance(0.5) { WeldRest::Straight } else { WeldRest::AsInserted }, until: when });
+        }
+        40 => scene.welds.iter_mut().for_each(|w| w.until = when),
+        41 => scene.settings.integrator = Integrator::TrBdf2,
         _ => {
             let drive = Drive::Force { direction: d.direction(), force: x, speed_limit: 1.0 };
             scene.acts.push((when, if d.chance(0.5) { Act::Drive(0, drive) } else { Act::GripPose(0, Pose::new(d.vector(x), d.turn())) }));

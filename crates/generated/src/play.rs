@@ -7,7 +7,8 @@ use sutura::glam::DVec3;
 use sutura::input::Recorder;
 use sutura::math::exp;
 use sutura::{
-    Drive, Error, Grip, GripSpec, Handle, IncidentKind, Load, LoadKind, LoadSpec, Place, Pose, Rod, RodView, Shape, StepReport, Stretch, View, World,
+    Drive, Error, Grip, GripSpec, Handle, IncidentKind, Integrator, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, StepReport,
+    Stretch, View, Weld, WeldSpec, World,
 };
 
 /// A scene being played.
@@ -19,6 +20,8 @@ pub struct Player<'a> {
     pub rods: Vec<Option<Handle<Rod>>>,
     shapes: Vec<Option<Handle<Shape>>>,
     loads: Vec<Option<Handle<Load>>>,
+    welds: Vec<Option<Handle<Weld>>>,
+    reels: Vec<Option<Handle<Reel>>>,
     grips: Vec<Option<(Handle<Grip>, Pose)>>,
     frame: u32,
     /// Frames in a row in which no acceptable substep was found.
@@ -35,7 +38,8 @@ impl<'a> Player<'a> {
     pub fn new(scene: &'a Scene, record: bool) -> Result<Self, Error> {
         let world = Recorder::new(scene.settings.clone(), record)?;
         let grips = vec![None; scene.grips.len()];
-        let mut player = Player { scene, world, rods: Vec::new(), shapes: Vec::new(), loads: Vec::new(), grips, frame: 0, stuck: 0, refused: 0 };
+        let (rods, shapes, loads, welds, reels) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut player = Player { scene, world, rods, shapes, loads, welds, reels, grips, frame: 0, stuck: 0, refused: 0 };
         if scene.other_order {
             player.insert_shapes();
             player.insert_rods();
@@ -64,6 +68,22 @@ impl<'a> Player<'a> {
             let rod = self.world.insert_rod(spec);
             let rod = self.done(rod);
             self.rods.push(rod);
+        }
+        for weld in &self.scene.welds {
+            let places: Option<Vec<_>> = weld.places.iter().map(|(rod, place)| Some((self.rod(*rod)?, *place))).collect();
+            let weld = places.and_then(|places| {
+                let weld = self.world.insert_weld(&WeldSpec { places, rest: weld.rest });
+                self.done(weld)
+            });
+            self.welds.push(weld);
+        }
+        for reel in &self.scene.reels {
+            let reel = self.rod(reel.rod).and_then(|rod| {
+                let length = self.world.rod(rod).map_or(0.0, |r| r.rest_length());
+                let reel = self.world.insert_reel(&ReelSpec { rod, at_end: reel.at_end, law: reel.law, supply: reel.supply.map(|s| s * length) });
+                self.done(reel)
+            });
+            self.reels.push(reel);
         }
     }
     fn insert_shapes(&mut self) {
@@ -124,6 +144,18 @@ impl<'a> Player<'a> {
             }
         }
         let (scene, now) = (self.scene, self.frame);
+        for (i, _) in scene.welds.iter().enumerate().filter(|(_, w)| w.until == now) {
+            if let Some(weld) = self.welds[i].take() {
+                // It may have gone with its threads.
+                let _ = self.world.remove_weld(weld);
+            }
+        }
+        for (i, reel) in scene.reels.iter().enumerate() {
+            if let (Some((_, law)), Some(handle)) = (reel.later.filter(|(frame, _)| *frame == now), self.reels[i]) {
+                let set = self.world.set_reel(handle, law);
+                self.done(set);
+            }
+        }
         for (_, act) in scene.acts.iter().filter(|(frame, _)| *frame == now) {
             self.do_act(act);
         }
@@ -229,6 +261,8 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
         return seen;
     };
     let mut energies = scene.is_passive().then(|| Turnover::new(scene, player.world.view()));
+    // Ends that were welded lie in each other when the weld is gone, and part.
+    let audited = audited && scene.welds.iter().all(|w| w.until == u32::MAX);
     let mut audit = Audit::new();
     if audited {
         audit.observe(player.world.view());
@@ -265,9 +299,11 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
 fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
     let settings = world.settings();
     let wanted = (dt / settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
+    // Of second order there are two solves, and one more where contacts changed.
+    let solves = if settings.integrator == Integrator::TrBdf2 { 3 } else { 1 };
     let attempts = wanted * f64::from((2u32 << settings.halvings) - 1);
     if f64::from(report.substeps) + f64::from(report.rejected) > attempts
-        || report.newton_iterations > settings.newton_max * (report.substeps + report.rejected)
+        || report.newton_iterations > solves * settings.newton_max * (report.substeps + report.rejected)
     {
         return Some(format!("more work than the settings allow: {report:?}"));
     }
@@ -289,9 +325,15 @@ fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
         if !rod.orientations().iter().all(|q| q.is_finite() && (q.length() - 1.0).abs() < 1e-6) {
             return Some("a frame is not a rotation".into());
         }
+        if !(0..rod.n_joints()).all(|j| rod.moment(j).is_finite() && rod.strain(j).is_finite()) {
+            return Some("a moment in a thread is not finite".into());
+        }
         if !(0..rod.n_elements()).all(|e| rod.internal_force(e).is_finite()) {
             return Some("a force in a thread is not finite".into());
         }
+    }
+    if !world.view().welds().all(|w| w.pose.position.is_finite() && (w.pose.orientation.length() - 1.0).abs() < 1e-6) {
+        return Some("the pose of a weld is not finite".into());
     }
     if !world.view().shapes().all(|s| s.pose.position.is_finite() && s.pose.orientation.is_finite()) {
         return Some("the pose of a shape is not finite".into());

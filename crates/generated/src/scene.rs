@@ -1,7 +1,7 @@
 //! A scene as data: what is inserted, how grips move, and what is done at which frame.
 
 use sutura::glam::DVec3;
-use sutura::{Drive, Friction, Hold, LoadKind, Place, Pose, RodSpec, Settings, ShapeSpec};
+use sutura::{Drive, Friction, Hold, LoadKind, Place, Pose, ReelLaw, RodSpec, Settings, ShapeSpec, WeldRest};
 
 /// A scene.
 #[derive(Debug, Clone)]
@@ -12,6 +12,10 @@ pub struct Scene {
     pub frictions: Vec<(u32, u32, Friction)>,
     /// Threads, with explicit frames where it is to be transformed.
     pub rods: Vec<RodSpec>,
+    /// Places of threads that are joined.
+    pub welds: Vec<Joined>,
+    /// Reels.
+    pub reels: Vec<Reeled>,
     /// Shapes.
     pub shapes: Vec<ShapeSpec>,
     /// Grips.
@@ -51,6 +55,32 @@ pub struct Held {
     pub spin: DVec3,
 }
 
+/// Places of threads that are joined for a time.
+#[derive(Debug, Clone)]
+pub struct Joined {
+    /// Numbers of the threads, and where.
+    pub places: Vec<(usize, Place)>,
+    /// Shape at rest.
+    pub rest: WeldRest,
+    /// Frame at whose beginning they come apart.
+    pub until: u32,
+}
+
+/// A reel.
+#[derive(Debug, Clone, Copy)]
+pub struct Reeled {
+    /// Number of the thread.
+    pub rod: usize,
+    /// At which end.
+    pub at_end: bool,
+    /// What it does, and what from some frame on.
+    pub law: ReelLaw,
+    /// See `law`.
+    pub later: Option<(u32, ReelLaw)>,
+    /// What is on it, in lengths of the thread as inserted.
+    pub supply: Option<f64>,
+}
+
 /// Something done while it runs. Numbers are those of the scene's lists; what is not there (any more) is passed over.
 #[derive(Debug, Clone)]
 pub enum Act {
@@ -78,11 +108,29 @@ impl Scene {
         let still = |g: &Held| g.drive == Drive::Pose && g.ramp == 0.0 && g.from == 0 && g.velocity == DVec3::ZERO && g.spin == DVec3::ZERO;
         let potential = |kind: &LoadKind| !matches!(kind, LoadKind::Point { torque, .. } if *torque != DVec3::ZERO);
         let fixed = |s: &ShapeSpec| s.motion == sutura::ShapeMotion::Fixed;
-        self.grips.iter().all(still) && self.loads.iter().all(|(_, k)| potential(k)) && self.shapes.iter().all(fixed) && self.acts.is_empty()
+        let ever = |w: &Joined| w.until == u32::MAX;
+        self.reels.is_empty()
+            && self.welds.iter().all(ever)
+            && self.grips.iter().all(still)
+            && self.loads.iter().all(|(_, k)| potential(k))
+            && self.shapes.iter().all(fixed)
+            && self.acts.is_empty()
     }
 
     /// Sum of the lengths of its threads \[m\].
     pub fn length(&self) -> f64 {
-        self.rods.iter().flat_map(|r| r.centerline.windows(2)).map(|w| w[0].distance(w[1])).sum()
+        self.rods.iter().map(|r| length(r, &r.centerline)).sum()
     }
+}
+
+/// Length of a thread along `centerline`, that of a closed one all around.
+pub fn length(rod: &RodSpec, centerline: &[DVec3]) -> f64 {
+    let open: f64 = centerline.windows(2).map(|w| w[0].distance(w[1])).sum();
+    let closing = rod.closure.map(|_| centerline[0].distance(centerline[centerline.len() - 1]));
+    open + closing.unwrap_or(0.0)
+}
+
+/// Number of its elements.
+pub fn elements(rod: &RodSpec) -> u32 {
+    rod.centerline.len() as u32 - u32::from(rod.closure.is_none())
 }

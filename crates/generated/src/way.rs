@@ -1,9 +1,12 @@
 //! The same scene otherwise: turned, mirrored, numbered from the other end, larger or smaller.
 
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Along, Closure, Drive, Geometry, LoadKind, Material, Place, Pose, Profile, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec};
+use sutura::math::exp;
+use sutura::{
+    Along, Closure, Drive, Geometry, LoadKind, Material, Place, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec,
+};
 
-use crate::scene::{Held, Scene};
+use crate::scene::{Held, Joined, Reeled, Scene, elements};
 
 /// What is done to a scene. The acts of a scene are not transformed: it must have none.
 #[derive(Debug, Clone, Copy)]
@@ -90,7 +93,7 @@ impl Way {
         };
         let length: f64 = match &rest {
             RestShape::Given { lengths: Some(l), .. } => l.iter().sum(),
-            _ => centerline.windows(2).map(|w| w[0].distance(w[1])).sum(),
+            _ => crate::scene::length(rod, &centerline),
         };
         let profile = |p: &Profile| {
             let mut points: Vec<(f64, f64)> = p.0.iter().map(|(arc, v)| if self.reversed { (length - arc * s, *v) } else { (arc * s, *v) }).collect();
@@ -102,16 +105,26 @@ impl Way {
         let along = Along { size: profile(&rod.along.size), modulus: profile(&rod.along.modulus), density: profile(&rod.along.density) };
         if self.reversed {
             centerline.reverse();
+            // A seam stays where it is.
+            if closure.is_some() {
+                centerline.rotate_right(1);
+            }
+            // Twist put in before closing is counted from the start, where its frames now have what was at their end.
+            let turn = closure.map_or(DQuat::IDENTITY, |c| exp(DVec3::Z * -c.twist));
             if let Some(frames) = &mut frames {
                 frames.reverse();
                 for q in frames {
-                    *q *= DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
+                    *q *= DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0) * turn;
                 }
             }
             (roll, pretwist) = (-(roll + pretwist), pretwist);
             if let RestShape::Given { lengths, darboux } = &mut rest {
                 lengths.iter_mut().for_each(|l| l.reverse());
-                darboux.iter_mut().for_each(|d| d.reverse());
+                // The joint at the seam is the last one also from the other end.
+                darboux.iter_mut().for_each(|d| {
+                    let joints = d.len() - usize::from(closure.is_some());
+                    d[..joints].reverse();
+                });
             }
         }
         let plasticity = rod.material.plasticity.map(|p| sutura::Plasticity { yield_curvature: p.yield_curvature / s, yield_twist: p.yield_twist / s, ..p });
@@ -187,6 +200,18 @@ impl Way {
         }
     }
 
+    fn law(&self, law: ReelLaw) -> ReelLaw {
+        match law {
+            ReelLaw::Rate(rate) => ReelLaw::Rate(rate),
+            ReelLaw::Brake(force) => ReelLaw::Brake(force * self.scale * self.scale),
+        }
+    }
+
+    fn reel(&self, reel: &Reeled) -> Reeled {
+        let later = reel.later.map(|(frame, law)| (frame, self.law(law)));
+        Reeled { at_end: reel.at_end != self.reversed, law: self.law(reel.law), later, ..*reel }
+    }
+
     /// The settings that go with it.
     pub fn settings(&self, settings: &Settings) -> Settings {
         Settings {
@@ -201,10 +226,13 @@ impl Way {
     /// The scene done this way.
     pub fn scene(&self, scene: &Scene) -> Scene {
         assert!(scene.acts.is_empty(), "acts are not transformed");
-        let n = |rod: usize| scene.rods[rod].centerline.len() as u32 - 1;
+        let n = |rod: usize| elements(&scene.rods[rod]);
+        let weld = |w: &Joined| Joined { places: w.places.iter().map(|(rod, place)| (*rod, self.place(*place, n(*rod)))).collect(), ..w.clone() };
         Scene {
             settings: self.settings(&scene.settings),
             rods: scene.rods.iter().map(|r| self.rod(r)).collect(),
+            welds: scene.welds.iter().map(weld).collect(),
+            reels: scene.reels.iter().map(|r| self.reel(r)).collect(),
             shapes: scene.shapes.iter().map(|s| self.shape(s)).collect(),
             grips: scene.grips.iter().map(|g| self.grip(g, n(g.rod))).collect(),
             loads: scene.loads.iter().map(|(rod, kind)| (*rod, self.load(kind, n(*rod)))).collect(),

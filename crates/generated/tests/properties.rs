@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::ops::ControlFlow;
+use sutura::Integrator;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::Recording;
 use sutura_generated::make::{self, Kind};
@@ -24,7 +25,7 @@ fn cases(n: u32) -> ProptestConfig {
 
 /// The numbers that a scene is drawn from.
 fn numbers() -> impl Strategy<Value = Vec<f64>> {
-    prop::collection::vec(0.0..1.0f64, 250)
+    prop::collection::vec(0.0..1.0f64, 300)
 }
 
 fn kinds() -> impl Strategy<Value = Kind> {
@@ -148,10 +149,12 @@ proptest! {
         prop_assert!(off <= allowed, "{:e} for {:e}", off, allowed);
     }
 
-    /// Nothing from outside: from substep to substep energy does not grow, contacts and friction included.
+    /// Nothing from outside: from substep to substep energy does not grow, contacts and friction included. Of implicit Euler: what is of second order may
+    /// gain in a substep what it lost before.
     #[test]
     fn energy_does_not_grow(numbers in numbers(), touching in any::<bool>()) {
-        let scene = sensible(numbers, if touching { Kind::Touching } else { Kind::FreePassive });
+        let mut scene = sensible(numbers, if touching { Kind::Touching } else { Kind::FreePassive });
+        scene.settings.integrator = Integrator::ImplicitEuler;
         let seen = watch(&scene, touching);
         prop_assert_eq!(&seen.fault, &None);
         prop_assert!(seen.growth <= GROWTH, "{:e} at {} s", seen.growth, seen.growth_time);

@@ -96,7 +96,8 @@ struct Sums {
     incidents: BTreeMap<&'static str, u64>,
     /// Scenes with an incident.
     with_incident: u64,
-    growth: Vec<f64>,
+    /// Most growth of energy in a substep, of scenes of first and of second order.
+    growth: [Vec<f64>; 2],
 }
 
 #[derive(Default)]
@@ -130,7 +131,9 @@ impl Robustness {
                         }
                         let ended = apart(self.seed, number, Duration::from_secs_f64(self.limit));
                         let mut found = found.lock().expect("nothing panics while it is held");
-                        if let Some(line) = found.take(number, numbered(self.seed, number).0, ended) {
+                        let (name, scene) = numbered(self.seed, number);
+                        let second_order = scene.settings.integrator == sutura::Integrator::TrBdf2;
+                        if let Some(line) = found.take(number, name, second_order, ended) {
                             // A bar that is not drawn prints nothing.
                             bar.suspend(|| eprintln!("{line}"));
                         }
@@ -162,7 +165,7 @@ impl Robustness {
 
 impl Found {
     /// Takes note of a scene; a line to print where something is wrong.
-    fn take(&mut self, number: u64, name: &'static str, ended: Ended) -> Option<String> {
+    fn take(&mut self, number: u64, name: &'static str, second_order: bool, ended: Ended) -> Option<String> {
         let seen = match ended {
             Ended::Well(seen) => seen,
             Ended::Panicked => {
@@ -185,7 +188,7 @@ impl Found {
             *sums.incidents.entry(kind).or_default() += n;
         }
         if matches!(name, "free passive" | "touching") {
-            sums.growth.push(seen.growth);
+            sums.growth[usize::from(second_order)].push(seen.growth);
             if seen.growth > self.worst.1 {
                 self.worst = (number, seen.growth, seen.growth_time);
             }
@@ -205,9 +208,11 @@ impl Found {
             out += &format!("| {name} | {} | {} | {} | {} | {} | {} | {incidents} |\n", s.scenes, s.frames, s.substeps, s.rejected, s.refused, s.with_incident);
         }
         out.push('\n');
-        for (name, s) in self.sums.iter().filter(|(_, s)| !s.growth.is_empty()) {
-            let q = |part: f64| quantile(&s.growth, part);
-            out += &format!("energy of {name}, most growth in a substep: median {:.1e}, 99 % {:.1e}, most {:.1e}\n", q(0.5), q(0.99), q(1.0));
+        for (name, s) in &self.sums {
+            for (growth, order) in s.growth.iter().zip(["implicit Euler", "second order"]).filter(|(g, _)| !g.is_empty()) {
+                let q = |part: f64| quantile(growth, part);
+                out += &format!("energy of {name}, {order}, most growth in a substep: median {:.1e}, 99 % {:.1e}, most {:.1e}\n", q(0.5), q(0.99), q(1.0));
+            }
         }
         out += &format!("most of all in scene {} at {:.4} s\n", self.worst.0, self.worst.2);
         out += &format!("{} panics, {} hangs, {} other faults; seed {seed}\n", self.panics.len(), self.hangs.len(), self.faults.len());

@@ -16,6 +16,8 @@ const SHORTEST: f64 = 0.4;
 const LEAST: f64 = 0.25;
 /// Length up to which a substep feeds in: what would be more elements than that is not a rate but a jump.
 const MOST: f64 = 1000.0;
+/// Length beyond which an element is not cut: too few digits say what is left of it.
+const ENDLESS: f64 = 1e9;
 
 impl ReelState {
     /// The element at the reel, in the world's arrays.
@@ -99,7 +101,7 @@ pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
             // The particle between the last element and the next.
             let inner = if reel.at_end { e } else { e + 1 };
             let drawn = if let ReelLaw::Rate(rate) = reel.law { (-rate * h).max(0.0) } else { 0.0 };
-            if length - drawn > LONGEST * nominal {
+            if length - drawn > LONGEST * nominal && length < ENDLESS * nominal {
                 // Toward the reel stays what is left of it.
                 let first = if reel.at_end { nominal } else { length - nominal };
                 let rod = reel.rod;
@@ -357,6 +359,19 @@ mod tests {
         let (_, mut state) = world.into_parts();
         let arcs: Vec<f64> = state.loads.iter_mut().filter_map(|(_, l)| if let Some(Place::Arc(s)) = l.kind.place_mut() { Some(*s) } else { None }).collect();
         assert!((arcs[0] - 0.015 - fed).abs() < 1e-12 && fed > 1e-3, "{arcs:?} {fed}");
+    }
+
+    #[test]
+    fn an_element_without_end_is_not_cut_to_nothing() {
+        let mut world = World::default();
+        let material = Material::elastic(2e9, 1150.0);
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, material)).unwrap();
+        world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.0), supply: None }).unwrap();
+        let (mut model, mut state) = world.into_parts();
+        state.rest_length[0] = 1e88;
+        follow(&mut model, &state);
+        renumber(&mut model, &mut state, 1e-3);
+        assert!(state.rest_length[..10].iter().all(|l| *l > 0.0));
     }
 
     #[test]

@@ -8,7 +8,8 @@ mod support;
 use support::{overhand, quiet, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch, World,
+    Drive, Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, ReelLaw, ReelSpec, RodSpec, Settings, ShapeSpec,
+    Stretch, WeldSpec, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -157,5 +158,37 @@ fn an_overhand_knot_whose_substeps_are_rejected_and_halved() {
     let (mut world, pins) = knotted(3);
     let second = second_run(&mut world, 9, |world, _| draw(world, pins));
     assert!(second.rejected > 5, "nothing was rejected: {second:?}");
+    assert_eq!(second.allocations, 0, "{second:?}");
+}
+
+#[test]
+fn a_ring_with_a_branch_that_falls_onto_a_table() {
+    let (material, radius) = t1();
+    let mut world = World::new(Settings::default()).unwrap();
+    let ring = world.insert_rod(&RodSpec::ring(DVec3::Z * 2e-3, DVec3::Z, DVec3::X * 0.01, 40, radius, material.clone())).unwrap();
+    let at = world.rod(ring).unwrap().positions()[20];
+    let branch = world.insert_rod(&RodSpec::straight(at, at - DVec3::X * 0.01, 10, radius, material)).unwrap();
+    world.insert_weld(&WeldSpec::new(vec![(ring, Place::Particle(20)), (branch, Place::Start)])).unwrap();
+    world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY)).unwrap();
+    let second = second_run(&mut world, 20, |_, _| {});
+    assert!(second.most_contacts > 10, "it does not lie: {second:?}");
+    assert_eq!(second.allocations, 0, "{second:?}");
+}
+
+/// Up to the number of elements that there were before: feeding in and drawing back over the same length allocates nothing the second time. (Beyond it
+/// the arrays grow, as if a thread were inserted.)
+#[test]
+fn a_reel_within_the_elements_that_there_were() {
+    let (material, radius) = t1();
+    let mut world = World::new(Settings::default()).unwrap();
+    let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::NEG_Z * 0.03, 30, radius, material)).unwrap();
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
+    let reel = world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.05), supply: None }).unwrap();
+    let mut most = 0;
+    let second = second_run(&mut world, 60, |world, frame| {
+        world.set_reel(reel, ReelLaw::Rate(if frame < 30 { 0.05 } else { -0.05 })).unwrap();
+        most = most.max(world.rod(rod).unwrap().n_elements());
+    });
+    assert!(most > 50, "{most}");
     assert_eq!(second.allocations, 0, "{second:?}");
 }

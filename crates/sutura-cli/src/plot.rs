@@ -170,8 +170,8 @@ impl Frame<'_> {
         }
         let mut color = 0;
         for (i, line) in figure.lines.iter().enumerate() {
-            // Dots belong to the curve before them.
-            color += usize::from(i > 0 && !line.dots);
+            // Dots belong to the curve before them; of several kinds the first do.
+            color += usize::from(i > 0 && (!line.dots || figure.lines[i - 1].dots));
             let [r, g, b] = THREAD_COLORS[color % THREAD_COLORS.len()];
             if line.dots {
                 let dots =

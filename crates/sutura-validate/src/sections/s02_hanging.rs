@@ -148,7 +148,7 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
         let points = (0..=60).map(|i| span * f64::from(i) / 60.0).map(|x| (x, height(x))).collect();
         curves.push(Curve { name: format!("catenary, span {span}"), points, dots: false });
         if let Some(s) = studies.iter().find(|s| s.name == format!("chain, span {span}")) {
-            curves.push(Curve { name: "ours".into(), points: s.curve.clone(), dots: true });
+            curves.push(Curve { name: format!("span {span}, ours"), points: s.curve.clone(), dots: true });
         }
     }
     vec![Plot { file: "catenary", title: "Chains of 80 links between two pins".into(), x: ("x / L", ""), y: ("z / L", ""), curves }]

@@ -88,7 +88,8 @@ fn buckled(e: f64, ends: End) -> Study {
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
-    let exact = (1..=60).map(|i| 0.55 * f64::from(i) / 60.0).map(|e| (e, elastica::buckled(e)[0])).collect();
+    let buckled = (1..=60).map(|i| 0.55 * f64::from(i) / 60.0).map(|e| (e, elastica::buckled(e)[0]));
+    let exact = std::iter::once((0.0, 1.0)).chain(buckled).collect();
     let ours = |word: &str| {
         let found = SHORTENINGS.iter().filter_map(|e| {
             let study = studies.iter().find(|s| s.name == format!("{word}, shortened by {e}"))?;

@@ -77,11 +77,11 @@ fn name((shortening, turns): (f64, f64)) -> String {
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
-    let exact = (-60..=60).map(|i| 0.1 * f64::from(i)).map(|x| (x, x.tanh().powi(2))).collect();
+    let exact = (-50..=50).map(|i| 0.1 * f64::from(i)).map(|x| (x, x.tanh().powi(2))).collect();
     let mut curves = vec![Curve { name: "tanh²".into(), points: exact, dots: false }];
     for case in CASES {
         if let Some(s) = studies.iter().find(|s| s.name == name(case)) {
-            let points = s.curve.iter().step_by(4).copied().filter(|p| p.0.abs() < 6.0).collect();
+            let points = s.curve.iter().step_by(4).copied().filter(|p| p.0.abs() <= 5.0).collect();
             curves.push(Curve { name: format!("{}, ours", s.name), points, dots: true });
         }
     }

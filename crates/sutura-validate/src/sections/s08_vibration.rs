@@ -231,9 +231,9 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
     let ours = studies.iter().find(|s| s.name == "cantilever, decay of mode 1").map_or_else(Vec::new, |s| s.curve.clone());
     let (w, h) = (bending(links::cantilever_modes(40)[0].0), 2.5e-4);
     let theory: Vec<(f64, f64)> = ours.iter().map(|(t, _)| (*t, (-euler_decay(w, h) * t).exp() * (euler_frequency(w, h) * t).cos())).collect();
-    let spectrum = |points: &[(f64, f64)]| -> Vec<(f64, f64)> {
-        (0..=120)
-            .map(|i| 0.5 * f64::from(i))
+    let spectrum = |points: &[(f64, f64)], step: f64| -> Vec<(f64, f64)> {
+        (0..=(60.0 / step) as u32)
+            .map(|i| step * f64::from(i))
             .map(|f| {
                 let (c, s) = points.iter().fold((0.0, 0.0), |(c, s), (t, z)| (c + z * (TAU * f * t).cos(), s + z * (TAU * f * t).sin()));
                 (f, c.hypot(s) * 2.0 / points.len().max(1) as f64)
@@ -241,8 +241,8 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
             .collect()
     };
     let curves = vec![
-        Curve { name: "theory with implicit Euler's decay".into(), points: spectrum(&theory), dots: false },
-        Curve { name: "ours".into(), points: spectrum(&ours), dots: true },
+        Curve { name: "theory with implicit Euler's decay".into(), points: spectrum(&theory, 0.1), dots: false },
+        Curve { name: "ours".into(), points: spectrum(&ours, 0.5), dots: true },
     ];
     vec![Plot {
         file: "vibration",

@@ -82,13 +82,13 @@ fn held(part: f64) -> Study {
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
-    let exact = (0..=50).map(|i| 0.04 * f64::from(i)).map(|x| (x, x.exp())).collect();
+    let exact = (0..=50).map(|i| 0.04 * f64::from(i)).map(|x| (x, (x * THIN).exp())).collect();
     let found = CASES.iter().filter_map(|(mu, degrees)| {
         let study = studies.iter().find(|s| s.name == format!("mu = {mu}, {degrees} degrees"))?;
         Some((mu * degrees.to_radians(), *study.row("T2 / T1")?.values.last()?))
     });
     let mut ours: Vec<(f64, f64)> = found.collect();
     ours.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let curves = vec![Curve { name: "exp(mu phi)".into(), points: exact, dots: false }, Curve { name: "ours".into(), points: ours, dots: true }];
+    let curves = vec![Curve { name: "exp(mu phi R / (R + r))".into(), points: exact, dots: false }, Curve { name: "ours".into(), points: ours, dots: true }];
     vec![Plot { file: "capstan", title: "Ratio of the forces of a thread that slides around a cylinder".into(), x: ("mu phi", ""), y: ("T2 / T1", ""), curves }]
 }

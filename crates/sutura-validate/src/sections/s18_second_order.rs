@@ -38,7 +38,7 @@ fn stepped(h: f64) -> Level {
 }
 
 /// The tip after two seconds. The rod begins in the shape of the continuum's mode, and the clamp turns its first element: a part of 0.005 of the second
-/// mode is in it, which at the shortest substep is more than the first mode loses in eight seconds, and dies within one.
+/// mode is in it, which at the shortest substep is more than the first mode loses in two seconds, and is gone by then.
 fn late(o: &Outcome) -> Vec<(f64, f64)> {
     series(o, "tip").into_iter().filter(|p| p.0 > 2.0).collect()
 }

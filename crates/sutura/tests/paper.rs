@@ -243,3 +243,52 @@ fn steps_are_repeatable_and_allocate_nothing() {
     }
     assert!(hashes.iter().all(|h| *h == hashes[0]), "{hashes:?}");
 }
+
+/// Out of all proportion: a state that is not finite is put back and said, whatever else happens.
+#[test]
+fn absurd_numbers_leave_a_finite_state() {
+    let (material, radius) = t1();
+    for size in [1e10, 1e20, 1e140, 1e300] {
+        let mut world = World::new(Settings { gravity: DVec3::new(0.1, 0.0, -1.0) * size, ..paper(PaperSettings::default()) }).unwrap();
+        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.03, 20, radius, material.clone())).unwrap();
+        world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Jaw)).unwrap();
+        world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: 0.01, half_length: 0.1 }, Pose::at(DVec3::Z * -0.02))).unwrap();
+        for _ in 0..20 {
+            let report = world.step(DT);
+            let view = world.rod(rod).unwrap();
+            let vectors = view.positions().iter().chain(view.velocities()).chain(view.angular_velocities());
+            assert!(vectors.into_iter().all(|v| v.is_finite()) && view.energy().total().is_finite(), "{size:e}");
+            assert!(report.incidents.iter().all(|i| i.kind == IncidentKind::NotFinite), "{:?}", report.incidents);
+        }
+    }
+}
+
+/// A ball that is driven into a hanging thread pushes it along and does not pass, half an element a step. (At four elements a step it is pushed as well, but spheres that only the lengths pull at the ball
+/// sink into it, by a little more than their radius: contacts are sought before the iterations.)
+#[test]
+fn a_driven_shape_pushes() {
+    let radius = 1e-3;
+    let settings = Settings { gravity: DVec3::ZERO, linear_damping: 0.9, ..paper(PaperSettings { friction: 0.0, ..PaperSettings::default() }) };
+    let mut world = World::new(settings).unwrap();
+    let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 50, radius, Material::elastic(1e8, 1150.0))).unwrap();
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
+    let ball = 5e-3;
+    let at = |k: u32| Pose::at(DVec3::new(0.08, -0.02 + 1e-3 * f64::from(k), 0.0));
+    let motion = ShapeMotion::Driven;
+    let shape = world.insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Sphere { radius: ball }, at(0)) }).unwrap();
+    let mut least = f64::INFINITY;
+    let mut touched = 0;
+    for k in 1..=48 {
+        world.set_shape_pose(shape, at(k)).unwrap();
+        let report = world.step(DT);
+        assert!(report.incidents.is_empty(), "{:?}", report.incidents);
+        touched += u32::from(report.contacts > 0);
+        let center = world.shape(shape).unwrap().pose.position;
+        assert!((center - at(k).position).length() < 1e-15);
+        least = world.rod(rod).unwrap().positions().iter().map(|x| (*x - center).length() - ball).fold(least, f64::min);
+    }
+    let view = world.rod(rod).unwrap();
+    assert!(touched >= 3, "{touched}");
+    assert!(least > 0.5 * radius, "{least}");
+    assert!(view.positions()[40].y > 0.02, "it was pushed along: {}", view.positions()[40]);
+}

@@ -135,9 +135,9 @@ impl Contacts {
         for (i, s) in self.swept.iter_mut().enumerate() {
             s.cell = cell(s.lo);
             let last = cell(s.hi);
-            for x in s.cell[0]..=last[0].min(s.cell[0] + 1) {
-                for y in s.cell[1]..=last[1].min(s.cell[1] + 1) {
-                    for z in s.cell[2]..=last[2].min(s.cell[2] + 1) {
+            for x in s.cell[0]..=last[0].min(s.cell[0].saturating_add(1)) {
+                for y in s.cell[1]..=last[1].min(s.cell[1].saturating_add(1)) {
+                    for z in s.cell[2]..=last[2].min(s.cell[2].saturating_add(1)) {
                         self.entries.push((hash([x, y, z]), i as u32));
                     }
                 }

@@ -263,7 +263,7 @@ fn absurd_numbers_leave_a_finite_state() {
     }
 }
 
-/// A ball that is driven into a hanging thread pushes it along and does not pass, half an element a step. (At four elements a step it is pushed as well, but spheres that only the lengths pull at the ball
+/// A ball that is driven into a thread pushes it along and does not pass, half an element a step. (At four elements a step it is pushed as well, but spheres that only the lengths pull at the ball
 /// sink into it, by a little more than their radius: contacts are sought before the iterations.)
 #[test]
 fn a_driven_shape_pushes() {

@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3, EulerRot};
 use sutura::math::{exp, frame_from_tangent, log};
 use sutura::{
-    Along, Closure, Friction, Geometry, Hold, Integrator, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings,
-    ShapeMotion, ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
+    Along, Closure, Friction, Geometry, Hold, Integrator, Material, PaperSettings, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section,
+    Settings, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, SweepOrder, WeldRest, transported_frames,
 };
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
@@ -374,6 +374,17 @@ impl<'d> Loader<'d> {
         if let Some(integrator) = table.get("integrator").and_then(|v| v.choice(&integrators)) {
             settings.integrator = integrator;
         }
+        let methods = [("direct", Solver::Direct), ("paper", Solver::Paper(PaperSettings::default()))];
+        if let Some(method) = table.get("method").and_then(|v| v.choice(&methods)) {
+            settings.solver = method;
+        }
+        if let Some(value) = table.get("paper") {
+            match (&mut settings.solver, value.table()) {
+                (Solver::Paper(numbers), Some(table)) => paper_numbers(&table, numbers),
+                (Solver::Direct, Some(_)) => value.problem("numbers of the paper's solver, which is not asked for", Some("add method = \"paper\"".into())),
+                (_, None) => {}
+            }
+        }
         let location = table.location();
         table.finish();
         (settings, location)
@@ -494,6 +505,30 @@ fn in_range_value(value: &Value<'_>, dim: Dim, from: f64, to: f64) -> Option<f64
 
 fn in_range(table: &Table<'_>, key: &str, dim: Dim, from: f64, to: f64) -> Option<f64> {
     in_range_value(&table.get(key)?, dim, from, to)
+}
+
+/// Numbers of the paper's solver.
+fn paper_numbers(table: &Table<'_>, numbers: &mut PaperSettings) {
+    if let Some(n) = table.get("iterations").and_then(|v| v.integer(1, 100_000)) {
+        numbers.iterations = n as u32;
+    }
+    let part = |key: &str, to: &mut f64| *to = in_range(table, key, Dim::NUMBER, 0.0, 1.0).unwrap_or(*to);
+    part("stretch_shear", &mut numbers.stretch_shear);
+    part("twist", &mut numbers.twist);
+    part("friction", &mut numbers.friction);
+    if let Some(value) = table.get("bend")
+        && let Some(bend) = value.quantities(Dim::NUMBER, "two numbers, for bending about d1 and d2")
+    {
+        match bend.as_slice() {
+            [a, b] if bend.iter().all(|k| (0.0..=1.0).contains(k)) => numbers.bend = [*a, *b],
+            _ => value.problem("wanted two numbers from 0 to 1", None),
+        }
+    }
+    numbers.frame_inertia = positive(table, "frame_inertia", Dim::NUMBER).unwrap_or(numbers.frame_inertia);
+    numbers.direct_distance = table.truth_or("ddc", numbers.direct_distance);
+    let orders = [("natural", SweepOrder::Natural), ("two_color", SweepOrder::TwoColor)];
+    numbers.order = table.get("order").and_then(|v| v.choice(&orders)).unwrap_or(numbers.order);
+    table.finish();
 }
 
 /// `mu`, or `stick` and `slide`.

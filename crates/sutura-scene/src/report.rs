@@ -111,7 +111,7 @@ pub struct Report {
 /// Solver and settings.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolverReport {
-    /// `direct`.
+    /// `direct` or `paper`.
     pub name: String,
     /// Frames per second.
     pub frame_rate: f64,

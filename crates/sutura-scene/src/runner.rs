@@ -532,7 +532,7 @@ impl Runner {
     fn solver_report(&self) -> SolverReport {
         let s = self.stage.world.settings();
         SolverReport {
-            name: "direct".into(),
+            name: if s.solver == sutura::Solver::Direct { "direct" } else { "paper" }.into(),
             frame_rate: self.scene.frame_rate,
             substep_s: s.substep,
             newton_max: s.newton_max,

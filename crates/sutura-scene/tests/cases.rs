@@ -287,3 +287,46 @@ tolerance = "0.014 mm"     # 1 % of the lengthening
         pitch * turns + 1.38683
     ));
 }
+
+/// The paper's solver by its keys: figure 8's thread keeps its length, and the report says whose answer it is.
+#[test]
+fn a_scene_for_the_papers_solver() {
+    let scene = |method: &str| {
+        format!(
+            r#"
+[solver]
+gravity = [0, 0, -0.1]     # else it stays straight and is pressed together
+substeps = 1
+angular_damping = 0.2
+method = "{method}"
+paper = {{ iterations = 10, stretch_shear = 1, bend = [0.05, 0.1], twist = 0.25, ddc = true, friction = 1, frame_inertia = 64, order = "two_color" }}
+[[thread]]
+name = "silk"
+{T1}
+elements = 40
+line = {{ from = [0, 0, 0], to = "[150, 0, 0] mm" }}
+[[grip]]
+name = "left"
+at = "start"
+hold = "jaw"
+[[grip]]
+name = "right"
+at = "end"
+hold = "jaw"
+[[phase]]
+action = [{{ move = "right", relative_to = "taken", keys = [{{ to = "[-50, 0, 0] mm", duration = "1 s" }}] }}]
+[[check]]
+name = "length"
+that = "length(silk)"
+equals = "150 mm"
+tolerance = "0.5 mm"
+"#
+        )
+    };
+    let report = run(&scene("paper")).report;
+    println!("{:?} {:?}", report.checks, report.incidents);
+    assert!(report.passed && report.incidents.is_empty());
+    assert_eq!((report.solver.name.as_str(), report.work.substeps), ("paper", report.frames));
+    let refused = Scene::parse(&scene("direct"), "case.toml").unwrap_err().to_string();
+    assert!(refused.contains("method = \"paper\""), "{refused}");
+}

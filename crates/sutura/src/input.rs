@@ -16,7 +16,7 @@ use crate::model::rod::{Closure, RestShape, Rod, RodSpec, Stretch};
 use crate::model::section::{Along, Profile, Section};
 use crate::model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Weld, WeldRest, WeldSpec};
-use crate::params::{Friction, Integrator, Settings};
+use crate::params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrder};
 use crate::report::StepReport;
 use crate::snapshot::{Bytes, Reader, damaged, structure, variants};
 use crate::view::View;
@@ -240,7 +240,7 @@ impl Replayed<'_> {
 
 /// First bytes of a recording: name and version.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 impl Recording {
     /// Does everything again in a world of its own; `watch` sees it after every step and may stop there. An error is that of an input that
@@ -337,7 +337,8 @@ impl Bytes for Profile {
     }
 }
 
-structure!(Settings { gravity, substep, newton_max, tolerance, linear_damping, angular_damping, friction, halvings, integrator });
+structure!(Settings { gravity, substep, newton_max, tolerance, linear_damping, angular_damping, friction, halvings, integrator, solver });
+structure!(PaperSettings { iterations, stretch_shear, bend, twist, direct_distance, friction, frame_inertia, order });
 structure!(Friction { stick, slide });
 structure!(Plasticity { yield_curvature, yield_twist, hardening });
 structure!(Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity });
@@ -351,6 +352,8 @@ structure!(GripSpec { rod, place, hold, drive, ramp });
 structure!(LoadSpec { rod, kind });
 variants!(Shear { 0 => Poisson(nu), 1 => Modulus(g) });
 variants!(Section { 0 => Round, 1 => Ellipse(axes), 2 => Rectangle(sides) });
+variants!(Solver { 0 => Direct, 1 => Paper(numbers) });
+variants!(SweepOrder { 0 => Natural, 1 => TwoColor });
 variants!(Integrator { 0 => ImplicitEuler, 1 => TrBdf2 });
 variants!(WeldRest { 0 => AsInserted, 1 => Straight });
 variants!(Stretch { 0 => Elastic, 1 => Inextensible });

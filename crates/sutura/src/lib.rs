@@ -16,6 +16,7 @@ pub mod math;
 mod model;
 mod newton;
 mod params;
+mod pbd;
 mod reel;
 mod report;
 mod rod;
@@ -38,7 +39,7 @@ pub use model::rod::{Closure, RestShape, Rod, RodSpec, Stretch, transported_fram
 pub use model::section::{Along, Profile, Section};
 pub use model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
 pub use model::weld::{Weld, WeldRest, WeldSpec};
-pub use params::{Friction, Integrator, Settings};
+pub use params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrder};
 pub use report::{Incident, IncidentKind, StepReport};
 pub use view::{ContactView, ContactWith, Energy, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

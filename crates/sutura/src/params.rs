@@ -26,6 +26,81 @@ pub struct Settings {
     pub halvings: u32,
     /// Default implicit Euler.
     pub integrator: Integrator,
+    /// Default [`Solver::Direct`].
+    pub solver: Solver,
+}
+
+/// Which solver steps the world.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub enum Solver {
+    /// Whole threads at once, with physical moduli and forces.
+    #[default]
+    Direct,
+    /// That of the 2018 paper, kept as published for comparison. Of the other settings it uses gravity, substep (one step a frame is the paper's) and
+    /// damping; of a thread its geometry, rest shape and mass. It knows no forces. Welds, reels, plastic set, and grips and shapes driven by force are not in it:
+    /// then nothing moves and the report says so.
+    Paper(PaperSettings),
+}
+
+/// Numbers of the paper's solver, without unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaperSettings {
+    /// Iterations a substep, >= 1. Default 20.
+    pub iterations: u32,
+    /// Stiffness of shear and stretch in [0, 1]: the part of a correction that is made. Default 1.
+    pub stretch_shear: f64,
+    /// Stiffness of bending about d1 and d2 in [0, 1]. Default 0.05.
+    pub bend: [f64; 2],
+    /// Stiffness of twist in [0, 1]. Default 0.25.
+    pub twist: f64,
+    /// Whether the lengths of a thread are solved for directly in each iteration. Default true.
+    pub direct_distance: bool,
+    /// Strength of friction k in [0, 1]. Default 1.
+    pub friction: f64,
+    /// Moment of inertia of an element over its mass and squared length, > 0. The paper does not name its own. Default 64: masses and inertias of 1, as
+    /// its equation (15) has them, at the size at which its elongations come out (elements of 1/8 of a unit). A slender bar is 1/12.
+    pub frame_inertia: f64,
+    /// Default natural, the paper's.
+    pub order: SweepOrder,
+}
+
+/// Order in which constraints of one kind are projected. The result of a finite number of iterations depends on it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum SweepOrder {
+    /// Along the thread.
+    #[default]
+    Natural,
+    /// Every other one, then those between: none waits for its neighbor.
+    TwoColor,
+}
+
+impl Default for PaperSettings {
+    fn default() -> Self {
+        PaperSettings {
+            iterations: 20,
+            stretch_shear: 1.0,
+            bend: [0.05; 2],
+            twist: 0.25,
+            direct_distance: true,
+            friction: 1.0,
+            frame_inertia: 64.0,
+            order: SweepOrder::Natural,
+        }
+    }
+}
+
+impl PaperSettings {
+    fn validate(&self) -> Result<(), Error> {
+        let what = "settings";
+        let part = |field: &str, v: f64| check(what, field, v, (0.0..=1.0).contains(&v), "a number in [0, 1]");
+        check(what, "paper.iterations", f64::from(self.iterations), self.iterations >= 1, "at least 1")?;
+        part("paper.stretch_shear", self.stretch_shear)?;
+        part("paper.bend", self.bend[0])?;
+        part("paper.bend", self.bend[1])?;
+        part("paper.twist", self.twist)?;
+        part("paper.friction", self.friction)?;
+        check(what, "paper.frame_inertia", self.frame_inertia, self.frame_inertia > 0.0, "a finite number > 0")
+    }
 }
 
 /// How motion is integrated in time. Where things come to rest does not depend on it.
@@ -71,6 +146,7 @@ impl Default for Settings {
             friction: Friction::coulomb(0.3),
             halvings: 12,
             integrator: Integrator::ImplicitEuler,
+            solver: Solver::Direct,
         }
     }
 }
@@ -139,6 +215,9 @@ impl Settings {
         check(what, "linear_damping", self.linear_damping, (0.0..1.0).contains(&self.linear_damping), "a number in [0, 1)")?;
         check(what, "angular_damping", self.angular_damping, (0.0..1.0).contains(&self.angular_damping), "a number in [0, 1)")?;
         check(what, "halvings", f64::from(self.halvings), self.halvings <= 12, "at most 12")?;
+        if let Solver::Paper(p) = &self.solver {
+            p.validate()?;
+        }
         self.friction.validate()
     }
 }

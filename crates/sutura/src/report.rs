@@ -21,11 +21,11 @@ pub struct StepReport {
     /// Largest |elongation| of an element of an inextensible rod, over its rest length; for an elastic rod |strain - T/EA|.
     pub length_error: f64,
     /// Least clearance between two pieces of thread over the accepted substeps, in thread diameters: (distance - radii) / diameter.
-    /// `None` when nothing was near.
+    /// `None` when nothing was near, and with the paper's solver: the audit measures it with any.
     pub thread_clearance: Option<f64>,
     /// Least clearance between thread and shape, in thread diameters.
     pub shape_clearance: Option<f64>,
-    /// Contacts that carried force at the end.
+    /// Contacts that carried force at the end; with the paper's solver, which has no forces, those that pushed in the last substep.
     pub contacts: u32,
     /// What went wrong.
     pub incidents: Vec<Incident>,
@@ -67,6 +67,11 @@ pub enum IncidentKind {
         /// Which input.
         what: &'static str,
     },
+    /// The paper's solver ([`Solver::Paper`](crate::Solver::Paper)) steps a world that has something which the paper has not: nothing moved.
+    NotInPaper {
+        /// What that is.
+        what: &'static str,
+    },
     /// Thread passed through thread or shape between accepted states (also found by the independent audit).
     PassedThrough {
         /// The thread, when it was one thread through itself.
@@ -82,6 +87,7 @@ impl core::fmt::Display for IncidentKind {
             IncidentKind::NotConverged { residual } => write!(f, "accepted without convergence: last move {residual:.2e} radii"),
             IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
             IncidentKind::BadInput { what } => write!(f, "bad input: {what}; nothing was done"),
+            IncidentKind::NotInPaper { what } => write!(f, "the paper's solver does not know {what}; nothing moved"),
             IncidentKind::PassedThrough { .. } => write!(f, "thread passed through"),
         }
     }

@@ -97,6 +97,8 @@ pub(crate) struct Scratch {
 
     pub candidates: Candidates,
     pub rows: Rows,
+    /// Of the paper's solver.
+    pub paper: crate::pbd::Work,
 }
 
 impl Scratch {

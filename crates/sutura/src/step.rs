@@ -7,7 +7,8 @@ use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind};
 use crate::model::shape::ShapeMotion;
 use crate::newton;
-use crate::params::Integrator;
+use crate::params::{Integrator, Solver};
+use crate::pbd;
 use crate::reel;
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::rod::strain;
@@ -27,6 +28,10 @@ pub(crate) struct Interval<'a> {
 
 /// Advances the whole world by the interval, in equal substeps no longer than the setting.
 pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, report: &mut StepReport) {
+    if let Solver::Paper(p) = model.settings.solver {
+        pbd::step(model, state, scratch, interval, &p, report);
+        return;
+    }
     scratch.fit(model);
     outside_forces(model, state, scratch);
     let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
@@ -137,7 +142,7 @@ fn advance(
 }
 
 /// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of finite ones.
-fn all_finite(model: &Model, state: &State) -> bool {
+pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
     let grips = state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
     let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
     let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
@@ -225,7 +230,7 @@ fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     }
 }
 
-fn save(state: &State, scratch: &mut Scratch, depth: u32) {
+pub(crate) fn save(state: &State, scratch: &mut Scratch, depth: u32) {
     let depth = depth as usize;
     while scratch.saved.len() <= depth {
         scratch.saved.push(State::default());
@@ -233,12 +238,12 @@ fn save(state: &State, scratch: &mut Scratch, depth: u32) {
     scratch.saved[depth].copy_from(state);
 }
 
-fn restore(state: &mut State, scratch: &Scratch, depth: u32) {
+pub(crate) fn restore(state: &mut State, scratch: &Scratch, depth: u32) {
     state.copy_from(&scratch.saved[depth as usize]);
 }
 
 /// Loads that do not depend on the motion.
-fn outside_forces(model: &Model, state: &State, scratch: &mut Scratch) {
+pub(crate) fn outside_forces(model: &Model, state: &State, scratch: &mut Scratch) {
     for i in 0..model.mass.len() {
         scratch.force[i] = model.settings.gravity * model.mass[i];
         scratch.torque[i] = DVec3::ZERO;
@@ -265,7 +270,7 @@ fn outside_forces(model: &Model, state: &State, scratch: &mut Scratch) {
 }
 
 /// Where each grip wants its piece at time `t`.
-fn grip_pose(grip: &GripState, interval: &Interval<'_>, t: f64) -> Pose {
+pub(crate) fn grip_pose(grip: &GripState, interval: &Interval<'_>, t: f64) -> Pose {
     let s = ((t - interval.start) / interval.length).clamp(0.0, 1.0);
     let command = grip.pose.interpolate(&grip.target, s);
     let u = if grip.ramp > 0.0 { (t - grip.taken_at) / grip.ramp } else { 1.0 };
@@ -381,16 +386,21 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
         }
     }
     scratch.rows.welds.predict(model, state, &mut scratch.freedom, stage.length());
+    move_shapes(model, state, interval, t, stage.length());
+    scratch.saved = saved;
+}
+
+/// Moves driven shapes on to time `t`, by a time `length`.
+pub(crate) fn move_shapes(model: &Model, state: &mut State, interval: &Interval<'_>, t: f64, length: f64) {
     for (slot, shape) in model.shapes.iter() {
         let k = slot as usize;
         if matches!(shape.motion, ShapeMotion::Driven) {
             // Rate that reaches the target at the end of the interval; equal to interpolating from its start.
-            let left = interval.start + interval.length - (t - stage.length());
-            let s = if left > stage.length() { stage.length() / left } else { 1.0 };
+            let left = interval.start + interval.length - (t - length);
+            let s = if left > length { length / left } else { 1.0 };
             state.shape_pose[k] = state.shape_pose[k].interpolate(&state.shape_target[k], s);
         }
     }
-    scratch.saved = saved;
 }
 
 /// Velocities from the motion, damping, plastic flow, and what the next substep starts from.

@@ -9,7 +9,7 @@ use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
 use crate::model::{Model, ShapeModel};
-use crate::params::{Friction, Settings};
+use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::Scratch;
@@ -659,7 +659,9 @@ impl World {
         let mut interval = crate::step::Interval { start, length: dt, observe };
         crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
         report.time = self.state.time;
-        report.contacts = self.contacts().count() as u32;
+        if self.model.settings.solver == Solver::Direct {
+            report.contacts = self.contacts().count() as u32;
+        }
         report.length_error = self.length_error();
         report
     }

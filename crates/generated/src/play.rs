@@ -260,7 +260,9 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
         seen.refused = 1;
         return seen;
     };
-    let mut energies = scene.is_passive().then(|| Turnover::new(scene, player.world.view()));
+    // Threads of a scene whose energy is looked at keep their numbers.
+    let whole = player.rods.iter().all(Option::is_some);
+    let mut energies = (whole && scene.is_passive()).then(|| Turnover::new(scene, player.world.view()));
     // Ends that were welded lie in each other when the weld is gone, and part.
     let audited = audited && scene.welds.iter().all(|w| w.until == u32::MAX);
     let mut audit = Audit::new();

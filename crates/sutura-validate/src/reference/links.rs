@@ -188,9 +188,9 @@ pub fn chain_swing(n: usize, length: f64, time: f64) -> [f64; 2] {
     rod_swing(n, length, 0.0, 0.0, &[time])[0]
 }
 
-/// The same at several times, in ascending order, with elastic joints and a clamped start (`bending` is EI over the mass \[m^4 / s^2\]; a pin where it is
-/// zero) and a drag, a force per velocity and mass \[1/s\]. Each piece between times has the integrator's 2000 steps: they have to resolve the highest
-/// mode.
+/// The same at several times, in ascending order, with elastic joints and a clamped start (`bending` is EI over the mass of the whole
+/// \[m^3 / s^2\]; a pin where it is zero) and a drag, a force per velocity and mass \[1/s\]. Each piece between times has the integrator's
+/// 2000 steps: they have to resolve the highest mode.
 pub fn rod_swing(n: usize, length: f64, bending: f64, drag: f64, times: &[f64]) -> Vec<[f64; 2]> {
     let l = length / n as f64;
     let carried = beyond(&masses(n));
@@ -287,7 +287,7 @@ mod tests {
     #[test]
     fn a_rod_let_go_level_comes_to_rest_as_a_cantilever() {
         let (n, length, g) = (5, 0.1, 5.0);
-        let got = rod_swing(n, length, super::super::material::GRAVITY * length.powi(3) / g, 30.0, &[0.5, 1.0, 1.5])[2];
+        let got = rod_swing(n, length, super::super::material::GRAVITY * length.powi(2) / g, 30.0, &[0.5, 1.0, 1.5])[2];
         let want = cantilever(n, 0.0, g);
         assert!((got[0] / length - want[0]).abs() < 1e-6 && (got[1] / length + want[1]).abs() < 1e-6, "{got:?} {want:?}");
     }

@@ -14,7 +14,7 @@ pub fn section() -> Section {
         11,
         "Linking number and writhe",
         "Gauss' integrals of polygons: the torus trefoil (radius 1, tube 0.4) against values computed apart, and against the double integral of the smooth \
-         curve; linking numbers, which are whole. That twist + writhe of a clamped rod keeps the turns put in is in section 5.",
+         curve; linking numbers, which are whole. That twist + writhe of a clamped rod and of a closed one keep the turns put in is in sections 5 and 4.",
     );
     let trefoil = |n: usize| curves::torus_knot(3, n).into_iter().map(DVec3::from).collect::<Vec<_>>();
     let mut study = Study::direct("torus trefoil").quick(true);

@@ -126,10 +126,12 @@ proptest! {
         prop_assert_eq!(off(&scene, &Way { scale, ..Way::default() }, scene.frames), 0.0);
     }
 
-    /// What rounds otherwise is off by no more than a thread that begins elsewhere by 1e-10 of its length.
+    /// What rounds otherwise is off by no more than a thread that begins elsewhere by 1e-10 of its length. Where a ring of strip snaps, one Newton step
+    /// more or less tells, so it must go to its end here too.
     #[test]
     fn turned_and_rescaled_to_rounding(numbers in numbers()) {
-        let scene = sensible(numbers, Kind::Free);
+        let mut scene = sensible(numbers, Kind::Free);
+        (scene.settings.tolerance, scene.settings.newton_max) = (1e-7, 40);
         let frames = scene.frames.min(8);
         let allowed = 3.0 * sensitivity(&scene, frames);
         for (name, way) in [("turned", turned()), ("x 10", Way { scale: 10.0, ..Way::default() }), ("x 0.1", Way { scale: 0.1, ..Way::default() })] {
@@ -138,11 +140,11 @@ proptest! {
         }
     }
 
-    /// From the other end Newton takes other steps, so it must go to its end: with a tolerance of 1e-7 rad both end at the same place.
+    /// From the other end Newton takes other steps, so it must go to its end: with a tolerance of 1e-9 rad both end at the same place.
     #[test]
     fn numbered_from_the_other_end_to_the_tolerance(numbers in numbers()) {
         let mut scene = sensible(numbers, Kind::Free);
-        (scene.settings.tolerance, scene.settings.newton_max) = (1e-7, 40);
+        (scene.settings.tolerance, scene.settings.newton_max) = (1e-9, 40);
         let frames = scene.frames.min(8);
         let allowed = 10.0 * sensitivity(&scene, frames);
         let off = off(&scene, &Way { reversed: true, ..Way::default() }, frames);

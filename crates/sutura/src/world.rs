@@ -280,6 +280,7 @@ impl World {
 
     /// Takes a weld apart. A thread that went through it goes on, ends are free. A clamp there goes on holding its own thread as it is: its pose turns
     /// from the cross-section of the weld to that of the thread.
+    /// What lay in each other at the weld touches from now on, and is pushed apart.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
         let gone = self.model.welds.remove(weld).ok_or(WELD)?;
         self.state.interrupt(Onset::Unknown);

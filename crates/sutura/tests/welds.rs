@@ -362,9 +362,9 @@ fn what_a_clamp_holds_stays_as_it_is_when_something_is_welded_to_it_and_when_it_
         world.insert_grip(&GripSpec::at_once(branch, Place::Start, Hold::Clamp)).unwrap();
         world.step(0.1);
         if removed {
-            world.remove_rod(rod).unwrap()
+            world.remove_rod(rod).unwrap();
         } else {
-            world.remove_weld(weld).unwrap()
+            world.remove_weld(weld).unwrap();
         }
         world.step(1.0);
         let end = *world.rod(branch).unwrap().positions().last().unwrap();

@@ -13,7 +13,8 @@ const LENGTH: f64 = 0.05;
 /// Columns stand or fall at these parts of the load of the chain of as many links.
 const PARTS: [f64; 2] = [0.95, 1.05];
 const COUNTS: [usize; 2] = [20, 50];
-const SHORTENINGS: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5];
+const PINNED: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.3, 0.5];
+const CLAMPED: [f64; 3] = [0.05, 0.15, 0.4];
 
 pub fn section() -> Section {
     let mut section = Section::new(
@@ -46,10 +47,10 @@ pub fn section() -> Section {
             .set("solver.substep", "5 ms");
         section.studies.push(stands(study.levels(levels.into()), part, 0.2));
     }
-    for e in SHORTENINGS {
+    for e in PINNED {
         section.studies.push(buckled(e, End::Pinned));
     }
-    for e in [0.05, 0.2] {
+    for e in CLAMPED {
         section.studies.push(buckled(e, End::Clamped));
     }
     let load = |o: &Outcome| 1e3 * last(o, "load");
@@ -90,8 +91,8 @@ fn buckled(e: f64, ends: End) -> Study {
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
     let buckled = (1..=60).map(|i| 0.55 * f64::from(i) / 60.0).map(|e| (e, elastica::buckled(e)[0]));
     let exact = std::iter::once((0.0, 1.0)).chain(buckled).collect();
-    let ours = |word: &str| {
-        let found = SHORTENINGS.iter().filter_map(|e| {
+    let ours = |word: &str, shortenings: &[f64]| {
+        let found = shortenings.iter().filter_map(|e| {
             let study = studies.iter().find(|s| s.name == format!("{word}, shortened by {e}"))?;
             Some((*e, *study.row("load over Euler's")?.values.last()?))
         });
@@ -99,8 +100,8 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
     };
     let curves = vec![
         Curve { name: "elastica".into(), points: exact, dots: false },
-        Curve { name: "pinned, ours".into(), points: ours("pinned"), dots: true },
-        Curve { name: "clamped, ours".into(), points: ours("clamped"), dots: true },
+        Curve { name: "pinned, ours".into(), points: ours("pinned", &PINNED), dots: true },
+        Curve { name: "clamped, ours".into(), points: ours("clamped", &CLAMPED), dots: true },
     ];
     vec![Plot { file: "buckling", title: "Load of a buckled column over Euler's".into(), x: ("shortening / L", ""), y: ("P / P Euler", ""), curves }]
 }

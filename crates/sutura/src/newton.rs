@@ -62,8 +62,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
-    while out.iterations < settings.newton_max {
+    while out.iterations < settings.newton_max && !scratch.exhausted() {
         out.iterations += 1;
+        scratch.work += 300.0 * model.mass.len() as f64 + 100.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
         row::shape::review(model, state, scratch, out.iterations == 1);
         brake::review(model, state, &mut scratch.brakes);
         row::couple::zones(scratch);

@@ -95,6 +95,8 @@ pub(crate) struct Scratch {
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
 
+    /// Work of the substep so far, in units of about a nanosecond: counted, not timed.
+    pub work: f64,
     pub candidates: Candidates,
     pub rows: Rows,
     /// Of the paper's solver.
@@ -102,6 +104,10 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
+    /// Whether the substep has taken all the work that it may.
+    pub fn exhausted(&self) -> bool {
+        self.work > crate::params::SUBSTEP_WORK
+    }
     /// Makes room for the model's arrays.
     pub fn fit(&mut self, model: &crate::model::Model) {
         let n = model.mass.len();

@@ -45,6 +45,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
             // Who looks from state to state must not lose sight of the motion to come.
             (interval.observe)(View { model, state });
         }
+        scratch.work = 0.0;
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
     // Where nothing acceptable was found, what is driven stays with the rest.
@@ -57,6 +58,9 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
 
 /// Why a substep is rejected whose numbers are not finite.
 const NOT_FINITE: &str = "not finite";
+
+/// Why one is that would not come to an end.
+const TOO_MUCH: &str = "more work than a substep may take";
 
 /// Accepted substeps of one length before twice the length is tried again.
 const CALM: u32 = 6;
@@ -123,7 +127,7 @@ fn advance(
             reel::follow(model, state);
             report.rejected += 1;
             (state.last_h, state.calm) = (0.5 * h, 0);
-            if depth < model.settings.halvings {
+            if depth < model.settings.halvings && !scratch.exhausted() {
                 let half = 0.5 * h;
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
@@ -192,6 +196,8 @@ fn solve(
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
             Err(NOT_FINITE)
+        } else if !outcome.converged && scratch.exhausted() {
+            Err(TOO_MUCH)
         } else if !outcome.converged && depth < model.settings.halvings {
             Err("not converged")
         } else {

@@ -5,7 +5,7 @@ mod support;
 use support::t1;
 use sutura::audit::Audit;
 use sutura::glam::DVec3;
-use sutura::{Geometry, GripSpec, Hold, LoadKind, LoadSpec, Place, Pose, RodSpec, Settings, ShapeSpec, World};
+use sutura::{Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Place, Pose, RodSpec, Settings, ShapeSpec, World};
 
 #[test]
 fn what_touches_a_held_piece_bears_on_it() {
@@ -35,6 +35,20 @@ fn what_touches_a_held_piece_bears_on_it() {
     assert!(audit.report().thread_clearance.unwrap() > -0.05, "{:?}", audit.report().thread_clearance);
     let force: f64 = world.contacts().map(|c| c.force.z.abs()).sum();
     assert!(force > 0.1, "{force}");
+}
+
+#[test]
+fn what_would_not_come_to_an_end_is_said_to_be_stuck() {
+    // Two threads as thick as they are long, side by side: every element of one lies in every element of the other, some twenty thousand contacts.
+    let mut world = World::new(Settings::default()).unwrap();
+    for y in [0.0, 0.01] {
+        let from = DVec3::new(0.0, y, 0.0);
+        world.insert_rod(&RodSpec::straight(from, from + DVec3::X * 0.1, 100, 0.05, t1().0)).unwrap();
+    }
+    let report = world.step(1.0 / 60.0);
+    let stuck = |k: &IncidentKind| matches!(k, IncidentKind::Stuck { reason } if reason.contains("work"));
+    assert!(report.incidents.iter().any(|i| stuck(&i.kind)), "{:?}", report.incidents.first());
+    assert!(world.view().rods().all(|r| r.positions().iter().all(|x| x.is_finite())));
 }
 
 #[test]

@@ -135,7 +135,7 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let Scratch { rods, rows, system, step, freedom, start, start_frame, start_shape_pose, .. } = scratch;
+    let Scratch { rods, rows, system, step, freedom, start, start_frame, start_shape_pose, work, .. } = scratch;
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
     entries.clear();
@@ -155,6 +155,13 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         force.extend(entry.force.to_array());
     }
     let n = b.len();
+    // Putting S together, and the most that its solution may take.
+    *work += 30.0 * (n * n) as f64 + params::CONTACT_WORK.max((n * n * n) as f64 / 10.0);
+    if *work > params::SUBSTEP_WORK {
+        *left = f64::INFINITY;
+        entries.clear();
+        return;
+    }
     s.clear();
     s.resize(n * n, 0.0);
     for (_, zone) in rods.iter() {

@@ -200,8 +200,7 @@ pub(crate) const SLIP: f64 = 1e-3;
 /// Multiplications that a contact solve may spend; large ones get a tenth of the cube of their unknowns, six tenths of a factorization. (One that is cut short
 /// has friction that does not hold yet: in a rope of threads that feeds itself from substep to substep.)
 pub(crate) const CONTACT_WORK: f64 = 3e6;
-/// Work that a substep with all its halves may take, in units of about a nanosecond: a hundred times what a knot drawn tight takes at its worst. What takes
-/// more will not come to an end in any time worth waiting for: the world counts as stuck.
+/// Work that a substep with all its halves may take, in rough counts of multiplications, so a minute or so. No sample scene reaches it. What takes more will not come to an end in any time worth waiting for: the world counts as stuck.
 pub(crate) const SUBSTEP_WORK: f64 = 5e10;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
 pub(crate) const CONTACT_LEFT: f64 = 0.06;

@@ -95,7 +95,7 @@ pub(crate) struct Scratch {
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
 
-    /// Work of the substep so far, in units of about a nanosecond: counted, not timed.
+    /// Work of the substep so far, in rough counts of multiplications: counted, not timed.
     pub work: f64,
     pub candidates: Candidates,
     pub rows: Rows,

@@ -41,6 +41,8 @@ pub enum Command {
     Bench(Bench),
     /// Compare what this build computes with theory
     Validate(Validate),
+    /// Run the experiments of the 2018 paper on its solver, its rivals and Sutura's own
+    Paper(Paper),
     /// Do a recorded input again and compare the state after every step
     Replay(Replay),
 }
@@ -381,6 +383,43 @@ pub struct Validate {
     /// Write no file, print what missed its bar
     #[arg(long, conflicts_with = "out")]
     pub dry: bool,
+}
+
+/// Run the experiments of the 2018 paper on its solver, its rivals and Sutura's own.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+The paper is \"Real-time inextensible surgical thread simulation\" (Int. J. CARS 13:1019, 2018). Each experiment is run on all solvers that belong to it: \
+the paper's at the size at which its numbers come out and at the size that it names, Sutura's own, discrete elastic rods, position-based elastic rods with ghost points, \
+plain position-based dynamics. The folder then holds:
+  paper.md                 one page: what the paper reports beside what is found
+  paper.html               the same in one file that needs no other
+  paper/*.svg, *.png       plots, pictures of the thread
+  paper/*.csv              the numbers; the same bytes on every run
+  paper/times.json         times measured
+
+Examples:
+  sutura paper                      everything, to out/paper.md
+  sutura paper fig8 fig13           two experiments
+  sutura paper --list               what there is
+  sutura paper all --out docs       writes docs/paper.md
+
+Exit codes: 0 all as asked for; 1 something is not; 2 the input could not be used.")]
+pub struct Paper {
+    /// Names of experiments [default: all]
+    #[arg(value_name = "FIGURE")]
+    pub figures: Vec<String>,
+    /// Folder for the page, plots and tables
+    #[arg(long, short, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+    /// How many runs at once [default: as many as there are cores]
+    #[arg(long, short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// List the experiments, run nothing
+    #[arg(long)]
+    pub list: bool,
+    /// Say which run was done and how long it took, instead of a progress bar
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// Do a recorded input again and compare the state after every step.

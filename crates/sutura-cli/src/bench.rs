@@ -18,12 +18,16 @@ struct Measured {
     knots: Vec<Knot>,
 }
 
+/// What times were measured on.
 #[derive(serde::Serialize)]
-struct Machine {
-    cpu: String,
-    cores: usize,
+pub struct Machine {
+    /// The processor.
+    pub cpu: String,
+    /// Its cores.
+    pub cores: usize,
     system: String,
-    build: &'static str,
+    /// Debug or release.
+    pub build: &'static str,
     version: &'static str,
 }
 
@@ -221,7 +225,8 @@ fn knot(name: &str, rod_ns: Option<f64>) -> anyhow::Result<Knot> {
     })
 }
 
-fn machine() -> Machine {
+/// This machine and build.
+pub fn machine() -> Machine {
     let brand = sysinfo::System::new().ok().and_then(|mut system| {
         system.refresh_cpu_list(sysinfo::CpuRefreshKind::nothing());
         system.cpus().first().map(|c| c.brand().trim().to_string()).filter(|b| !b.is_empty())

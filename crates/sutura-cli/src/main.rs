@@ -4,6 +4,8 @@ mod args;
 mod bench;
 mod knot;
 mod knot_strength;
+mod map;
+mod paper;
 mod plot;
 mod presets;
 mod replay;
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
         Some(Command::Presets(a)) => presets::presets(&a).map(|()| true),
         Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
         Some(Command::Validate(a)) => validate::validate(&a),
+        Some(Command::Paper(a)) => paper::paper(&a),
         Some(Command::Replay(a)) => replay::replay(&a),
     };
     ExitCode::from(match done {

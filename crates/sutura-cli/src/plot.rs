@@ -4,7 +4,7 @@
 use crate::still::{Image, Size, THREAD_COLORS};
 use anyhow::Context as _;
 use plotters::coord::Shift;
-use plotters::coord::ranged1d::ValueFormatter;
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
@@ -23,6 +23,8 @@ pub struct Figure {
     pub lines: Vec<Line>,
     /// Logarithmic ordinate (numbers at or under zero are left out).
     pub log: bool,
+    /// Logarithmic abscissa, in the same way.
+    pub log_x: bool,
     /// Stretches of the abscissa with names, shaded in turn.
     pub spans: Vec<(String, f64, f64)>,
     /// Ordinates that matter, with what they mean.
@@ -56,7 +58,13 @@ impl Figure {
     }
 
     fn can_show(&self, p: &(f64, f64)) -> bool {
-        p.0.is_finite() && p.1.is_finite() && (!self.log || p.1 > 0.0)
+        p.0.is_finite() && p.1.is_finite() && (!self.log || p.1 > 0.0) && (!self.log_x || p.0 > 0.0)
+    }
+
+    /// Part of the width at which an abscissa lies.
+    fn share(&self, v: f64, (from, to): (f64, f64)) -> f64 {
+        let scale = |v: f64| if self.log_x { v.max(f64::MIN_POSITIVE).ln() } else { v };
+        (scale(v) - scale(from)) / (scale(to) - scale(from))
     }
 
     /// Writes `<stem>.svg`.
@@ -68,10 +76,7 @@ impl Figure {
     /// Writes `<stem>.png` and `<stem>.svg`.
     pub fn write(&self, stem: &Path) -> anyhow::Result<()> {
         self.write_svg(stem)?;
-        let size = Size { width: SIZE.width * PNG_SCALE, height: SIZE.height * PNG_SCALE };
-        let mut image = Image { size, rgb: vec![255; (3 * size.width * size.height) as usize] };
-        overlay(&mut image, &self.svg()?, f64::from(PNG_SCALE))?;
-        image.write(&stem.with_extension("png"))
+        rasterize(&self.svg()?, (SIZE.width, SIZE.height))?.write(&stem.with_extension("png"))
     }
 
     fn svg(&self) -> anyhow::Result<String> {
@@ -89,12 +94,16 @@ impl Figure {
         let (factor, unit) = si_prefix(largest, &self.y.1);
         let range = |pick: fn(&(f64, f64)) -> f64| shown().map(|p| pick(&p)).fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(v), a.1.max(v)));
         let (x, y) = (range(|p| p.0), range(|p| p.1));
-        let x = if x.1 > x.0 { x } else { (x.0 - 0.5, x.0 + 0.5) };
+        let x = match x.1 > x.0 {
+            true if self.log_x => (x.0 / 1.1, x.1 * 1.1),
+            true => x,
+            false => (x.0 - 0.5, x.0 + 0.5),
+        };
         let frame = Frame { figure: self, factor, unit, x, largest: largest * factor };
-        // Under a factor of eight a logarithmic ordinate would have hardly a mark.
+        // Under a factor of eight a logarithmic axis would have hardly a mark.
         if self.log && y.1 > 8.0 * y.0 {
             let (low, high) = (y.0 * factor, y.1 * factor);
-            frame.draw(area, (low / 1.3..high * 1.6).log_scale())
+            frame.draw_over(area, (low / 1.3..high * 1.6).log_scale())
         } else {
             let (mut low, mut high) = (y.0 * factor, y.1 * factor);
             // An ordinate that begins near zero is shown from zero.
@@ -103,7 +112,7 @@ impl Figure {
             }
             let margin = if high > low { 0.08 * (high - low) } else { 0.5 * high.abs().max(1e-12) };
             (low, high) = (if low == 0.0 { 0.0 } else { low - margin }, high + 1.5 * margin);
-            frame.draw(area, low..high)
+            frame.draw_over(area, low..high)
         }
     }
 }
@@ -120,9 +129,21 @@ struct Frame<'a> {
 }
 
 impl Frame<'_> {
-    fn draw<Y>(&self, area: &Area<'_>, y: Y) -> anyhow::Result<()>
+    /// Draws over the abscissa that the figure asks for.
+    fn draw_over<Y>(&self, area: &Area<'_>, y: Y) -> anyhow::Result<()>
     where
-        Y: plotters::coord::ranged1d::AsRangedCoord<Value = f64>,
+        Y: AsRangedCoord<Value = f64>,
+        Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    {
+        let x = self.x;
+        if self.figure.log_x { self.draw(area, (x.0..x.1).log_scale(), y) } else { self.draw(area, x.0..x.1, y) }
+    }
+
+    fn draw<X, Y>(&self, area: &Area<'_>, across: X, y: Y) -> anyhow::Result<()>
+    where
+        X: AsRangedCoord<Value = f64>,
+        X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+        Y: AsRangedCoord<Value = f64>,
         Y::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
         let Frame { figure, x, factor, .. } = *self;
@@ -134,10 +155,10 @@ impl Frame<'_> {
             .caption(&figure.title, font(16))
             .x_label_area_size(px(42))
             .y_label_area_size(px(66))
-            .build_cartesian_2d(x.0..x.1, y)?;
+            .build_cartesian_2d(across, y)?;
         let (left, top) = chart.plotting_area().get_base_pixel();
         let (width, height) = chart.plotting_area().dim_in_pixel();
-        let column = |v: f64| left + ((v - x.0) / (x.1 - x.0) * f64::from(width)).clamp(0.0, f64::from(width)).round() as i32;
+        let column = |v: f64| left + (f64::from(width) * figure.share(v, x)).clamp(0.0, f64::from(width)).round() as i32;
         let spans = || figure.spans.iter().map(|(name, from, to)| (name, column(*from), column(*to)));
 
         for (_, a, b) in spans().skip(1).step_by(2) {
@@ -182,7 +203,7 @@ impl Frame<'_> {
             }
             let style = RGBColor(r, g, b).stroke_width(3 * FINE / 2);
             for (k, piece) in line.points.split(|p| !figure.can_show(p)).filter(|p| !p.is_empty()).enumerate() {
-                let points = thin(piece, x, SIZE.width as usize).into_iter().map(|(x, y)| (x, y * factor));
+                let points = thin(piece, |p| figure.share(p.0, x), SIZE.width as usize).into_iter().map(|(x, y)| (x, y * factor));
                 let drawn = chart.draw_series(LineSeries::new(points, style))?;
                 if k == 0 {
                     drawn.label(line.name.clone()).legend(move |(lx, ly)| PathElement::new([(lx, ly), (lx + px(16), ly)], style));
@@ -212,7 +233,7 @@ impl Frame<'_> {
         let points: Vec<(f64, f64)> =
             figure.lines.iter().flat_map(|l| l.points.iter().copied()).filter(|p| figure.can_show(p)).map(|p| (p.0, scale(p.1))).collect();
         let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, p| (a.0.min(p.1), a.1.max(p.1)));
-        let share = |p: &(f64, f64)| ((p.0 - self.x.0) / (self.x.1 - self.x.0), (p.1 - low) / (high - low).max(f64::MIN_POSITIVE));
+        let share = |p: &(f64, f64)| (figure.share(p.0, self.x), (p.1 - low) / (high - low).max(f64::MIN_POSITIVE));
         let hidden = |right: bool, from: f64, to: f64| {
             points.iter().map(share).filter(|(u, v)| (if right { *u > 0.75 } else { *u < 0.25 }) && (from..to).contains(v)).count()
         };
@@ -222,12 +243,12 @@ impl Frame<'_> {
     }
 }
 
-/// At most four points (first, least, greatest, last) for each of `columns` columns: what the eye sees of the curve, in a small file.
-fn thin(points: &[(f64, f64)], x: (f64, f64), columns: usize) -> Vec<(f64, f64)> {
+/// At most four points (first, least, greatest, last) for each of `columns` columns, by their share of the width: what the eye sees of the curve, in a small file.
+fn thin(points: &[(f64, f64)], across: impl Fn(&(f64, f64)) -> f64, columns: usize) -> Vec<(f64, f64)> {
     if points.len() <= 4 * columns {
         return points.to_vec();
     }
-    let column = |p: &(f64, f64)| ((p.0 - x.0) / (x.1 - x.0) * columns as f64) as usize;
+    let column = |p: &(f64, f64)| (across(p) * columns as f64) as usize;
     let mut out = Vec::with_capacity(4 * columns);
     for piece in points.chunk_by(|a, b| column(a) == column(b)) {
         let by = |a: &usize, b: &usize| piece[*a].1.total_cmp(&piece[*b].1);
@@ -294,6 +315,14 @@ pub fn caption(image: &mut Image, text: &str, width: f64) -> anyhow::Result<()> 
     overlay(image, &svg, 1.0)
 }
 
+/// An SVG text of this size as a picture, twice as fine, on white.
+pub fn rasterize(svg: &str, (width, height): (u32, u32)) -> anyhow::Result<Image> {
+    let size = Size { width: width * PNG_SCALE, height: height * PNG_SCALE };
+    let mut image = Image { size, rgb: vec![255; (3 * size.width * size.height) as usize] };
+    overlay(&mut image, svg, f64::from(PNG_SCALE))?;
+    Ok(image)
+}
+
 /// Draws an SVG text over a picture.
 fn overlay(image: &mut Image, svg: &str, scale: f64) -> anyhow::Result<()> {
     use resvg::{tiny_skia, usvg};
@@ -335,7 +364,7 @@ mod tests {
     #[test]
     fn thinning_keeps_ends_and_extremes() {
         let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), if i == 54_321 { 9.0 } else { f64::from(i % 7) })).collect();
-        let thinned = thin(&points, (0.0, 99_999.0), 500);
+        let thinned = thin(&points, |p| p.0 / 99_999.0, 500);
         assert!(thinned.len() <= 4 * 501);
         assert_eq!((thinned[0], thinned[thinned.len() - 1]), (points[0], points[99_999]));
         assert!(thinned.contains(&(54_321.0, 9.0)), "a single spike is what one looks for");

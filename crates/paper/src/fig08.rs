@@ -20,6 +20,8 @@ const MOVE: f64 = 4.0;
 const FRAMES: usize = 600;
 /// Rate at which velocities fade \[1/s\], so that it comes to rest. The paper names none.
 const DRAG: f64 = 2.0;
+/// Gravity that only says which way to bend \[m/s^2\].
+const NUDGE: f64 = 1e-3;
 /// Points at which shapes are compared.
 const POINTS: usize = 200;
 
@@ -101,15 +103,15 @@ fn pbd(iterations: usize, substeps: usize) -> Method {
 fn plan() -> Plan {
     let case = |method: Method, n: usize, gravity: f64, role: Role| Case { method, n, gravity, role };
     let mut cases = Vec::new();
-    for gravity in [weak(), GRAVITY] {
+    for gravity in [NUDGE, weak(), GRAVITY] {
         cases.push(case(der(4), 320, gravity, Role::Converged));
-        let one_each = [paper(20, 1), Method::Paper(PaperSettings::default(), 1), pber(20, 1), pbd(20, 1), direct(4), der(1)];
+        let one_each = [paper(20, 1), Method::Paper(PaperSettings::default(), 1), pber(20, 1), pber(80, 1), pbd(20, 1), direct(4), der(1)];
         cases.extend(one_each.into_iter().map(|m| case(m, N, gravity, Role::Figure)));
         let two_color = PaperSettings { order: SweepOrder::TwoColor, ..numbers() };
         cases.push(case(Method::Paper(two_color, 1), N, gravity, Role::Figure));
         // At true scale one step a frame is too long for the position-based methods; with ten the step is that of the effective scale.
         if gravity == GRAVITY {
-            cases.extend([paper(20, 10), pber(20, 10), pbd(20, 10)].into_iter().map(|m| case(m, N, gravity, Role::Figure)));
+            cases.extend([paper(20, 10), pber(80, 10), pbd(20, 10)].into_iter().map(|m| case(m, N, gravity, Role::Figure)));
         }
     }
     for n in [10, 20, 40, 80, 160] {
@@ -149,9 +151,20 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
     let loop_error = |c: &Case, a: &Answer| a.out_of_plane / converged(c.gravity).out_of_plane - 1.0;
     let figures = || found.iter().filter(|(c, _)| c.role == Role::Figure);
 
-    let headings = ["gravity [m/s^2]", "method", "steps x iterations", "bend : twist", "out of plane [mm]", "against DER, converged", "shape, RMS / length", "elongation", "moved in the last second [mm]"];
+    let headings = [
+        "gravity [m/s^2]",
+        "method",
+        "steps x iterations",
+        "bend : twist",
+        "out of plane [mm]",
+        "against DER, converged",
+        "shape, RMS / length",
+        "elongation",
+        "moved in the last second [mm]",
+    ];
     let mut table = Table::new("loop", "Out-of-plane distance of the loop at rest, 40 elements (converged: DER, 320 elements)", &headings);
-    let mut times = Table::new("times", "CPU time of a frame, 40 elements", &["gravity [m/s^2]", "method", "steps x iterations", "ms a frame (median)"]).measured();
+    let mut times =
+        Table::new("times", "CPU time of a frame, 40 elements", &["gravity [m/s^2]", "method", "steps x iterations", "ms a frame (median)"]).measured();
     for (c, a) in found.iter().filter(|(c, _)| c.role != Role::Sweep) {
         table.row([
             c.gravity.into(),
@@ -174,19 +187,38 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
         figures().find(|(c, _)| fits(c) && (stiffness(&c.method) != "0.05 : 0.25" || !own)).expect("it was run")
     };
     let weak = weak();
-    let [p, pb, pl, d, rod] = [("paper", "1 x 20"), ("PBER", "1 x 20"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
+    let [p, pb, pl, d, rod] = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
         .map(|(name, budget)| pick(name, budget, true, weak));
-    let strong = ["paper", "PBER", "PBD"].map(|name| pick(name, "1 x 20", true, GRAVITY));
+    let strong = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20")].map(|(name, budget)| pick(name, budget, true, GRAVITY));
+    let [p0, pb0, pl0, d0, rod0] = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
+        .map(|(name, budget)| pick(name, budget, true, NUDGE));
+    let few = pick("PBER", "1 x 20", true, NUDGE);
     let (d_true, p_ten) = (pick("direct", "4 x Newton", true, GRAVITY), pick("paper", "10 x 20", true, GRAVITY));
     let default = figures().find(|(c, _)| c.gravity == weak && stiffness(&c.method) == "0.05 : 0.25").expect("it was run");
 
-    for ((c, a), name) in [(p, "paper"), (pb, "PBER"), (d, "direct"), (rod, "DER, 40 elements")] {
+    let physical = [
+        (d0, "direct, without gravity"),
+        (d, "direct, effective scale"),
+        (d_true, "direct, true scale"),
+        (rod0, "DER, 40 elements, without gravity"),
+        (rod, "DER, 40 elements, effective scale"),
+    ];
+    for ((c, a), name) in [(p0, "paper, without gravity"), (pb0, "PBER, without gravity")]
+        .into_iter()
+        .chain(physical)
+        .chain([(p, "paper, effective scale"), (pb, "PBER, effective scale")])
+    {
         let e = loop_error(c, a);
-        out.checks.push(Check::new(format!("loop of {name} within 10 % of converged DER"), "10 %", percent(e), e.abs() <= 0.1));
+        out.checks.push(Check::new(format!("loop of {name}, against converged DER"), "within 10 %", percent(e), e.abs() <= 0.1));
     }
-    out.checks.push(Check::new("plain PBD shows no loop", "< 1 % of DER's", mm(pl.1.out_of_plane), pl.1.out_of_plane < 0.01 * converged(weak).out_of_plane));
-    let e = loop_error(&d_true.0, &d_true.1);
-    out.checks.push(Check::new("loop of direct at true scale within 10 % of converged DER", "10 %", percent(e), e.abs() <= 0.1));
+    for (found, place) in [(pl0, "without gravity"), (pl, "effective scale")] {
+        out.checks.push(Check::new(
+            format!("plain PBD shows no loop, {place}"),
+            "< 1 % of DER's",
+            mm(found.1.out_of_plane),
+            found.1.out_of_plane < 0.01 * converged(found.0.gravity).out_of_plane,
+        ));
+    }
 
     out.compare.push(Compare {
         what: "8: out-of-plane loop, ours / PBER / plain PBD".into(),
@@ -205,10 +237,22 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
     out.checks.push(Check::new("paper, 40 elements, 20 iterations: ms a frame", "<= 0.1", number(p.1.ms), p.1.ms <= 0.1).measured());
 
     // Cost against error: a method is better where its curve lies farther to the lower left.
-    let mut plot = Plot::new("cost", "Cost against error: 10 to 160 elements, at rest, effective scale", Axis::log("error of the shape, RMS over length", ""), Axis::log("CPU time of a frame", "ms"));
+    let mut plot = Plot::new(
+        "cost",
+        "Cost against error: 10 to 160 elements, at rest, effective scale",
+        Axis::log("error of the shape, RMS over length", ""),
+        Axis::log("CPU time of a frame", "ms"),
+    );
     plot.measured = true;
-    let mut sweep = Table::new("errors", "Error of the shape at rest by method, elements and budget", &["method", "elements", "steps x iterations", "error / length", "elongation"]).hidden();
-    let mut costs = Table::new("costs", "Cost by method, elements and budget", &["method", "elements", "steps x iterations", "error / length", "ms a frame"]).measured().hidden();
+    let mut sweep = Table::new(
+        "errors",
+        "Error of the shape at rest by method, elements and budget",
+        &["method", "elements", "steps x iterations", "error / length", "elongation"],
+    )
+    .hidden();
+    let mut costs = Table::new("costs", "Cost by method, elements and budget", &["method", "elements", "steps x iterations", "error / length", "ms a frame"])
+        .measured()
+        .hidden();
     let mut lines: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
     for (c, a) in found.iter().filter(|(c, _)| c.gravity == weak && c.role != Role::Converged && stiffness(&c.method) != "0.05 : 0.25") {
         let e = error(c, a);
@@ -223,7 +267,8 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
         }
     }
     let budgets = |name: &str| -> Vec<(f64, f64)> {
-        let mut own: Vec<&(Case, Answer)> = found.iter().filter(|(c, _)| c.role == Role::Sweep && c.n == N && c.method.name() == name && c.gravity == weak).collect();
+        let mut own: Vec<&(Case, Answer)> =
+            found.iter().filter(|(c, _)| c.role == Role::Sweep && c.n == N && c.method.name() == name && c.gravity == weak).collect();
         own.sort_by(|a, b| a.1.ms.total_cmp(&b.1.ms));
         own.into_iter().map(|(c, a)| (error(c, a), a.ms)).collect()
     };
@@ -238,7 +283,12 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
     for name in ["paper", "PBER"] {
         plot.line(format!("{name}, 40 elements, 5 to 320 iterations"), budgets(name));
     }
-    let mut equal = Table::new("equal", "Cheapest setting that reaches an error (RMS of the shape at rest over the length)", &["error", "direct [ms]", "DER [ms]", "paper [ms]", "PBER [ms]"]).measured();
+    let mut equal = Table::new(
+        "equal",
+        "Cheapest setting that reaches an error (RMS of the shape at rest over the length)",
+        &["error", "direct [ms]", "DER [ms]", "paper [ms]", "PBER [ms]"],
+    )
+    .measured();
     let mut always = true;
     for bound in [0.1, 0.03, 0.01, 0.003, 0.001, 0.0003] {
         let [d, rest @ ..] = ["direct", "DER", "paper", "PBER"].map(|m| cheapest(m, bound));
@@ -248,7 +298,9 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
             equal.row([percent(bound).into(), cell(d), cell(rest[0]), cell(rest[1]), cell(rest[2])]);
         }
     }
-    out.checks.push(Check::new("direct is the cheapest at equal error", "at each error of the table", if always { "yes" } else { "no, see the table" }, always).measured());
+    out.checks.push(
+        Check::new("direct is the cheapest at equal error", "at each error of the table", if always { "yes" } else { "no, see the table" }, always).measured(),
+    );
 
     out.say(format!(
         "A thread of 15 cm between clamps (0.3 mm, 2 GPa, Poisson's ratio 0.4), straight at rest. In {MOVE} s the ends come together by 5 cm while one turns once; then all comes to rest. The \
@@ -256,6 +308,18 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
          *gravity {}* means, and what the physical methods are compared at as well. Out-of-plane distance: of all planes through the line between the ends, the one is taken from which the farthest \
          point is nearest.",
         number(weak)
+    ));
+    out.say(format!(
+        "**Without gravity** (a ten-thousandth of it, which says which way to bend) all but plain PBD show the loop: paper {} at 20 iterations, PBER {} at 80 ({} at 20, where it still creeps), direct {}, DER {}. \
+         PBER is converged at some 12 mm: the joints beside its held edges are softer, since a ghost point that is held cannot give way. **At the effective scale** gravity, weak as it is, wins over \
+         the constraints of 20 iterations: the loop of the paper's solver is {} and that of PBER {}; both grow with the iterations.",
+        mm(p0.1.out_of_plane),
+        mm(pb0.1.out_of_plane),
+        mm(few.1.out_of_plane),
+        mm(d0.1.out_of_plane),
+        mm(rod0.1.out_of_plane),
+        mm(p.1.out_of_plane),
+        mm(pb.1.out_of_plane),
     ));
     out.say(format!(
         "**Numbers without unit.** Bending and twisting stiffness of a round rod are in the ratio 1 : {}; with numbers in that ratio the paper's solver gives {} at the effective scale, with those \
@@ -274,11 +338,12 @@ fn finish(found: Vec<(Case, Answer)>) -> Outcome {
         mm(p_ten.1.out_of_plane),
     ));
     out.say(format!(
-        "**Cost.** Published: PBER over ours 12, ours over plain PBD 1.2. Here, in one run: {} and {}.",
+        "**Cost.** Published: PBER over ours 12, ours over plain PBD 1.2, at numbers of iterations that are not named. Here, in one run, PBER at 80 iterations and the others at 20: {} and {}.",
         number(pb.1.ms / p.1.ms),
         number(p.1.ms / pl.1.ms)
     ));
 
+    out.pictures.push(picture(&found, NUDGE, "loop", "Without gravity, from the side (top row) and from above (bottom row)"));
     out.pictures.push(picture(&found, weak, "effective", "At the effective scale, from the side (top row) and from above (bottom row)"));
     out.pictures.push(picture(&found, GRAVITY, "true", "At true scale, from the side (top row) and from above (bottom row)"));
     out.plots.push(plot);
@@ -297,8 +362,9 @@ fn stiffness(m: &Method) -> String {
 }
 
 fn picture(found: &[(Case, Answer)], gravity: f64, name: &str, title: &str) -> Picture {
-    let shown = ["paper", "PBER", "PBD", "direct", "DER"].map(|m| {
-        found.iter().find(|(c, _)| c.role == Role::Figure && c.gravity == gravity && c.method.name() == m && stiffness(&c.method) != "0.05 : 0.25").expect("it was run")
+    let shown = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")].map(|(m, budget)| {
+        let fits = |c: &Case| c.role == Role::Figure && c.gravity == gravity && c.method.name() == m && c.method.budget() == budget;
+        found.iter().find(|(c, _)| fits(c) && stiffness(&c.method) != "0.05 : 0.25").expect("it was run")
     });
     let panel = |(c, a): &(Case, Answer), above: bool| Panel {
         label: format!("{}{}", c.method.name(), if above { ", from above" } else { "" }),

@@ -1,9 +1,7 @@
 //! The solvers, behind one interface: that of the rivals. A thread for one is a thread for all.
 
 use sutura::glam::{DQuat, DVec3};
-use sutura::{
-    Grip, GripSpec, Handle, Integrator, Material, PaperSettings, Place, Pose, RestShape, Rod, RodSpec, Settings, Shear, Stretch, SweepOrder, World,
-};
+use sutura::{Grip, GripSpec, Handle, Integrator, Material, PaperSettings, Place, Pose, RestShape, Rod, RodSpec, Settings, Shear, Stretch, SweepOrder, World};
 use sutura_rivals::{Der, Hold, Pbd, Pber, Scene, Solver, der, pbd, pber};
 
 /// A solver with its settings.

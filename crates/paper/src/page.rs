@@ -64,7 +64,13 @@ pub fn table(t: &Table) -> String {
     let rule: Vec<&str> = (0..t.headings.len()).map(|c| if numbers(c) { "---:" } else { "---" }).collect();
     let _ = writeln!(out, "|{}|", rule.join("|"));
     for row in &t.rows {
-        let cells: Vec<String> = row.iter().map(|c| match c { Cell::Word(w) => w.clone(), Cell::Number(v) => number(*v) }).collect();
+        let cells: Vec<String> = row
+            .iter()
+            .map(|c| match c {
+                Cell::Word(w) => w.clone(),
+                Cell::Number(v) => number(*v),
+            })
+            .collect();
         let _ = writeln!(out, "| {} |", cells.join(" | "));
     }
     out

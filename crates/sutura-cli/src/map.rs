@@ -41,7 +41,8 @@ fn draw(svg: &mut String, grid: &Grid, (left, top): (f64, f64)) {
     for (row, cells) in grid.cells.iter().enumerate() {
         for (column, (mark, good)) in cells.iter().enumerate() {
             let (x, y) = (left + column as f64 * CELL.0, top + row as f64 * CELL.1);
-            let _ = writeln!(svg, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>", x + 1.0, y + 1.0, CELL.0 - 2.0, CELL.1 - 2.0, shade(*good));
+            let _ =
+                writeln!(svg, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>", x + 1.0, y + 1.0, CELL.0 - 2.0, CELL.1 - 2.0, shade(*good));
             text(svg, (x + 0.5 * CELL.0, y + 0.5 * CELL.1 + 4.0), 10, "middle", "", mark);
         }
     }

@@ -200,7 +200,9 @@ fn html(markdown: &str, out: &Path) -> String {
     };
     let mut body = String::new();
     pulldown_cmark::html::push_html(&mut body, Parser::new_ext(markdown, Options::ENABLE_TABLES).map(inline));
-    format!("<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>The paper, reproduced</title><style>{STYLE}</style></head><body>\n{body}</body></html>\n")
+    format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>The paper, reproduced</title><style>{STYLE}</style></head><body>\n{body}</body></html>\n"
+    )
 }
 
 /// A picture as text that stands for it.

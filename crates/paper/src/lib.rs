@@ -5,11 +5,14 @@
 //! files are the caller's. What is found depends on nothing but the code; times do, and are kept apart ([`Table::measured`]).
 
 mod fig08;
+mod fig13;
+mod helix;
 mod measure;
 mod method;
 mod outcome;
 mod page;
 mod plan;
+mod scale;
 
 pub use outcome::{Axis, Cell, Check, Compare, Curve, Grid, Outcome, Panel, Picture, Plot, Solid, Table, Tube};
 pub use page::{page, table};
@@ -17,5 +20,5 @@ pub use plan::{Experiment, Progress, Result, run};
 
 /// All experiments, in the order of the figures.
 pub fn experiments() -> Vec<Experiment> {
-    vec![fig08::EXPERIMENT]
+    vec![fig08::EXPERIMENT, fig13::EXPERIMENT, scale::EXPERIMENT]
 }

@@ -32,7 +32,7 @@ fn plan() -> Plan {
     Plan::new(cases, |(m, size)| format!("{}, {}, {size} m", m.name(), m.budget()), |(m, size)| fall(m, *size, N), finish)
 }
 
-fn finish(found: Vec<((Method, f64), Fall)>) -> Outcome {
+fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
     let mut out = Outcome::default();
     let paper_of = |size: f64, ddc: bool| -> Vec<&Fall> {
         let fits = |m: &Method| matches!(m, Method::Paper(p, _) if p.direct_distance == ddc);
@@ -43,7 +43,7 @@ fn finish(found: Vec<((Method, f64), Fall)>) -> Outcome {
     let headings = ["length [m]", "method", "steps x iterations", "DDC", "greatest elongation", "mean of the last second"];
     let mut table = Table::new("elongation", "Elongation of the thread as a whole in 5 s of falling and swinging, 120 elements", &headings);
     let mut times = Table::new("times", "CPU time of a frame", &["length [m]", "method", "steps x iterations", "DDC", "ms a frame (median)"]).measured();
-    for ((m, size), f) in &found {
+    for ((m, size), f) in found {
         let (ddc, budget) = match m {
             Method::Paper(p, _) => (if p.direct_distance { "yes" } else { "no" }, m.budget()),
             Method::Direct(d) => ("-", format!("{} x at most {}", d.substeps, d.newton_max)),
@@ -54,7 +54,7 @@ fn finish(found: Vec<((Method, f64), Fall)>) -> Outcome {
     }
     let mut exact =
         Table::new("elongation_numbers", "Elongation", &["length [m]", "method", "substeps", "iterations", "DDC", "greatest", "last second"]).hidden();
-    for ((m, size), f) in &found {
+    for ((m, size), f) in found {
         let (substeps, iterations, ddc) = match m {
             Method::Paper(p, n) => (*n, p.iterations, if p.direct_distance { "yes" } else { "no" }),
             Method::Direct(d) => (d.substeps, d.newton_max, "-"),

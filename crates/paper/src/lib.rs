@@ -5,6 +5,9 @@
 //! files are the caller's. What is found depends on nothing but the code; times do, and are kept apart ([`Table::measured`]).
 
 mod fig08;
+mod fig09;
+mod fig10;
+mod fig12;
 mod fig13;
 mod helix;
 mod measure;
@@ -20,5 +23,5 @@ pub use plan::{Experiment, Progress, Result, run};
 
 /// All experiments, in the order of the figures.
 pub fn experiments() -> Vec<Experiment> {
-    vec![fig08::EXPERIMENT, fig13::EXPERIMENT, scale::EXPERIMENT]
+    vec![fig08::EXPERIMENT, fig09::EXPERIMENT, fig10::EXPERIMENT, fig12::EXPERIMENT, fig13::EXPERIMENT, scale::EXPERIMENT]
 }

@@ -26,7 +26,7 @@ pub fn page(results: &[Result], made: &str, file: &dyn Fn(&str, &str) -> String)
         out.push('\n');
     }
     for r in results {
-        let _ = write!(out, "## {}. {}\n\n{}\n\n", heading(r), r.title, r.outcome.text);
+        let _ = write!(out, "## {}\n\n{}\n\n", heading(r), r.outcome.text);
         if !r.outcome.checks.is_empty() {
             out.push_str("| asked for | bar | found | |\n|---|---|---|---|\n");
             for c in &r.outcome.checks {
@@ -53,7 +53,7 @@ pub fn page(results: &[Result], made: &str, file: &dyn Fn(&str, &str) -> String)
 
 /// Name of a section: that of the published figures, if there are some.
 fn heading(r: &Result) -> String {
-    if r.figures.is_empty() { r.name.into() } else { format!("Figure {}", r.figures) }
+    if r.figures.is_empty() { r.title.into() } else { format!("Figure {}. {}", r.figures, r.title) }
 }
 
 /// A table as Markdown.

@@ -62,7 +62,7 @@ impl Plan {
         cases: Vec<C>,
         label: impl Fn(&C) -> String,
         run: impl Fn(&C) -> A + Clone + Send + Sync + 'static,
-        finish: impl FnOnce(Vec<(C, A)>) -> Outcome + 'static,
+        finish: impl FnOnce(&[(C, A)]) -> Outcome + 'static,
     ) -> Plan
     where
         C: Clone + Send + Sync + 'static,
@@ -75,34 +75,10 @@ impl Plan {
         let boxed = cases.iter().map(case).collect();
         let finish = move |answers: Vec<Answer>| {
             let answers = answers.into_iter().map(|a| *a.downcast::<A>().expect("answers are made by `run`"));
-            finish(cases.into_iter().zip(answers).collect())
+            let found: Vec<(C, A)> = cases.into_iter().zip(answers).collect();
+            finish(&found)
         };
         Plan { cases: boxed, finish: Box::new(finish) }
-    }
-    /// Both plans, as one experiment: what each finds, one after the other.
-    pub fn and(self, other: Plan) -> Plan {
-        let n = self.cases.len();
-        let mut cases = self.cases;
-        cases.extend(other.cases);
-        let finish = move |mut answers: Vec<Answer>| {
-            let later = answers.split_off(n);
-            let (mut first, second) = ((self.finish)(answers), (other.finish)(later));
-            first.add(second);
-            first
-        };
-        Plan { cases, finish: Box::new(finish) }
-    }
-}
-
-impl Outcome {
-    fn add(&mut self, other: Outcome) {
-        self.say(other.text);
-        self.compare.extend(other.compare);
-        self.checks.extend(other.checks);
-        self.tables.extend(other.tables);
-        self.plots.extend(other.plots);
-        self.grids.extend(other.grids);
-        self.pictures.extend(other.pictures);
     }
 }
 

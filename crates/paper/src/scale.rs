@@ -47,7 +47,7 @@ fn describe(m: &Method) -> String {
     format!("{}, {}", m.name(), m.budget())
 }
 
-fn finish(found: Vec<(Case, Fall)>) -> Outcome {
+fn finish(found: &[(Case, Fall)]) -> Outcome {
     let mut out = Outcome::default();
     let at = |ours: bool, size: f64, substeps: u32, iterations: u32, n: usize| {
         let same = |c: &Case| c.ours == ours && c.size == size && c.substeps == substeps && c.iterations == iterations && c.n == n;
@@ -87,7 +87,7 @@ fn finish(found: Vec<(Case, Fall)>) -> Outcome {
         &["method", "length [m]", "elements", "substeps a frame", "iterations", "greatest elongation", "g h^2 over the length of an element"],
     )
     .hidden();
-    for (c, f) in &found {
+    for (c, f) in found {
         table.row([
             if c.ours { "direct" } else { "paper" }.into(),
             c.size.into(),

@@ -1,6 +1,6 @@
 //! Maps of marks by row and column, as SVG and PNG.
 
-use crate::plot::rasterize;
+use crate::plot::{PNG_SCALE, rasterize};
 use anyhow::Context as _;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub fn write(grids: &[Grid], stem: &Path) -> anyhow::Result<()> {
     svg.push_str("</svg>\n");
     let path = stem.with_extension("svg");
     std::fs::write(&path, &svg).with_context(|| format!("cannot write {}", path.display()))?;
-    rasterize(&svg, (size.0 as u32, size.1 as u32))?.write(&stem.with_extension("png"))
+    rasterize(&svg, (size.0 as u32, size.1 as u32), PNG_SCALE)?.write(&stem.with_extension("png"))
 }
 
 fn draw(svg: &mut String, grid: &Grid, (left, top): (f64, f64)) {

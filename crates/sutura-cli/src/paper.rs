@@ -145,12 +145,10 @@ fn sheet(p: &Picture) -> anyhow::Result<Image> {
         words.push_str(&format!("<text x=\"{x}\" y=\"{y}\">{escaped}</text>"));
     }
     words.push_str("</g></svg>");
-    let mut image = rasterize(&words, (size.width, size.height))?;
-    // Text is drawn twice as fine as the page shows it, and so are the panels.
-    let fine = image.size.width / size.width;
+    let mut image = rasterize(&words, (size.width, size.height), 1)?;
     for (k, panel) in p.panels.iter().enumerate() {
-        let own = view(panel, Size { width: PANEL.width * fine, height: PANEL.height * fine });
-        let (left, top) = (PANEL.width * fine * (k % columns) as u32, (PANEL.height + WORDS) * fine * (k / columns) as u32);
+        let own = view(panel, PANEL);
+        let (left, top) = (PANEL.width * (k % columns) as u32, (PANEL.height + WORDS) * (k / columns) as u32);
         for row in 0..own.size.height {
             let from = 3 * (row * own.size.width) as usize;
             let to = 3 * ((top + row) * image.size.width + left) as usize;

@@ -46,7 +46,7 @@ const SIZE: Size = Size { width: 860, height: 440 };
 /// Units of drawing in a pixel of `SIZE`: the drawing code rounds to whole units, which would show as steps.
 const FINE: u32 = 8;
 /// Pixels of the PNG in a pixel of `SIZE`.
-const PNG_SCALE: u32 = 2;
+pub const PNG_SCALE: u32 = 2;
 const INK: RGBColor = RGBColor(55, 60, 68);
 const FAINT: RGBColor = RGBColor(226, 229, 233);
 const BAND: RGBColor = RGBColor(246, 247, 249);
@@ -76,7 +76,7 @@ impl Figure {
     /// Writes `<stem>.png` and `<stem>.svg`.
     pub fn write(&self, stem: &Path) -> anyhow::Result<()> {
         self.write_svg(stem)?;
-        rasterize(&self.svg()?, (SIZE.width, SIZE.height))?.write(&stem.with_extension("png"))
+        rasterize(&self.svg()?, (SIZE.width, SIZE.height), PNG_SCALE)?.write(&stem.with_extension("png"))
     }
 
     fn svg(&self) -> anyhow::Result<String> {
@@ -315,11 +315,11 @@ pub fn caption(image: &mut Image, text: &str, width: f64) -> anyhow::Result<()> 
     overlay(image, &svg, 1.0)
 }
 
-/// An SVG text of this size as a picture, twice as fine, on white.
-pub fn rasterize(svg: &str, (width, height): (u32, u32)) -> anyhow::Result<Image> {
-    let size = Size { width: width * PNG_SCALE, height: height * PNG_SCALE };
+/// An SVG text of this size as a picture on white, `fine` times as fine.
+pub fn rasterize(svg: &str, (width, height): (u32, u32), fine: u32) -> anyhow::Result<Image> {
+    let size = Size { width: width * fine, height: height * fine };
     let mut image = Image { size, rgb: vec![255; (3 * size.width * size.height) as usize] };
-    overlay(&mut image, svg, f64::from(PNG_SCALE))?;
+    overlay(&mut image, svg, f64::from(fine))?;
     Ok(image)
 }
 

@@ -191,7 +191,7 @@ th{background:#f6f7f9}img{max-width:100%;height:auto}code{background:#f2f3f5;pad
 fn html(markdown: &str, out: &Path) -> String {
     let inline = |event: Event<'_>| match event {
         Event::Start(Tag::Image { link_type, dest_url, title, id }) => {
-            let data = data_url(&out.join(&*dest_url)).map_or_else(|| dest_url.into_string(), |d| d);
+            let data = data_url(&out.join(&*dest_url)).unwrap_or_else(|| dest_url.into_string());
             Event::Start(Tag::Image { link_type, dest_url: CowStr::from(data), title: title.into_static(), id: id.into_static() })
         }
         other => other.into_static(),

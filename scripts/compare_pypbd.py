@@ -1,12 +1,24 @@
 #!/usr/bin/env python3
-"""Measures the free thread of `sutura bench` beside the direct solver for stiff rods of pypbd (Deul et al. 2018).
+"""Measures sutura beside pypbd: the free thread of `sutura bench` and the direct solver for stiff rods (Deul et al. 2018); with --rods the
+solver of the 2018 paper and the Cosserat rods of Kugelstadt and Schoemer 2016, whose constraints it has.
 
     python3 scripts/compare_pypbd.py [--sutura PATH] [--rounds N] [--frames N] [--elements N ...] [--json]
+    python3 scripts/compare_pypbd.py --rods [--rounds N] [--frames N] [--elements N ...] [--json]
 
-The job of both: 15 cm of thread, radius 0.1 mm, E = 1 GPa, Poisson's ratio 0.4, 1150 kg/m^3, straight and level, one end held, let go,
+*Direct solver.* The job of both: 15 cm of thread, radius 0.1 mm, E = 1 GPa, Poisson's ratio 0.4, 1150 kg/m^3, straight and level, one end held, let go,
 60 frames a second, four steps a frame. pypbd makes one iteration a step (its default); sutura runs at its default settings to its own
 tolerance. Time is the CPU time of the stepping call on one core, the median over the frames of a round; rounds alternate between the
 two programs and the table has the median of the rounds.
+
+*Rods.* Both project shear and stretch of every element, then bend and twist of every joint, so many times a step; what is compared is the
+time that one more iteration takes, over the number of elements: the slope between 20 and 40 iterations, so that what a step costs beside
+them does not count. pypbd runs as it is installed, its own loop over its own constraints (TimeStepController, by color of its own finding:
+two colors of elements, two of joints), on 15 m of thread, masses and inertias of 1, one end held, that falls, 60 steps a second. sutura is
+`cargo bench -p sutura --bench paper`: figure 8 of the paper, in natural and in two-color order, without and with its direct distance
+constraint, which pypbd has not. The cost of an iteration depends on neither scene. Medians over frames, then over rounds, in turn.
+
+pypbd's function for such a thread takes quaternions, a type that pypbd itself does not give to Python. A module of a few lines that does so
+is built for that (needs a C++ compiler and the headers of Python; pybind11 of the same kind as pypbd's, and Eigen, are installed beside it).
 
 The first run makes a virtual environment with pypbd and numpy in the user's cache folder ($XDG_CACHE_HOME or ~/.cache).
 """
@@ -18,9 +30,11 @@ import pathlib
 import statistics
 import subprocess
 import sys
+import sysconfig
 import venv
 
 PYPBD = "2.2.2"
+PYBIND11, EIGEN = "3.0.1", "3.4.1"
 LENGTH, RADIUS, YOUNG, POISSON, DENSITY = 0.15, 1e-4, 1e9, 0.4, 1150.0
 FRAME = 1.0 / 60.0
 STEPS = 4
@@ -36,6 +50,119 @@ def python_with_pypbd():
         venv.create(home, with_pip=True, clear=True)
         subprocess.run([str(python), "-m", "pip", "install", "--quiet", f"pypbd=={PYPBD}", "numpy"], check=True)
     return python
+
+
+# The type of pypbd's quaternions, for its function `addLineModel`.
+QUATERNION = """
+#include <Eigen/Geometry>
+#include <pybind11/pybind11.h>
+using Quaternion = Eigen::Quaternion<double, Eigen::DontAlign>;
+PYBIND11_MODULE(eigen_quaternion, module) {
+    pybind11::class_<Quaternion>(module, "Quaternion").def(pybind11::init<double, double, double, double>());
+}
+"""
+
+
+def build_quaternion(python):
+    """Builds the module `eigen_quaternion` in the virtual environment, if it is not there."""
+    home = python.parent.parent
+    if subprocess.run([str(python), "-c", "import eigen_quaternion"], capture_output=True).returncode == 0:
+        return
+    print(f"building eigen_quaternion in {home}", file=sys.stderr)
+    subprocess.run([str(python), "-m", "pip", "install", "--quiet", f"pybind11=={PYBIND11}", f"cmeel-eigen=={EIGEN}"], check=True)
+    ask = "import json, pybind11, sysconfig; print(json.dumps([pybind11.get_include(), *map(sysconfig.get_path, ('include', 'purelib'))]))"
+    *headers, site = json.loads(subprocess.run([str(python), "-c", ask], check=True, capture_output=True, text=True).stdout)
+    source = home / "eigen_quaternion.cpp"
+    source.write_text(QUATERNION)
+    module = pathlib.Path(site) / ("eigen_quaternion" + sysconfig.get_config_var("EXT_SUFFIX"))
+    headers.append(str(pathlib.Path(site) / "cmeel.prefix" / "include" / "eigen3"))
+    flags = ["-O2", "-std=c++17", "-shared", "-fPIC", "-fvisibility=hidden", *(f"-I{h}" for h in headers)]
+    subprocess.run([os.environ.get("CXX", "c++"), *flags, str(source), "-o", str(module)], check=True)
+
+
+def rods_in_pypbd(elements, frames):
+    """One round of its Cosserat rods: ns an element and iteration, ms a frame at 20 iterations, and the longest element at the end over its rest."""
+    import math
+    import time
+
+    import numpy as np
+    import pypbd as pbd
+    from eigen_quaternion import Quaternion
+
+    sim = pbd.Simulation.getCurrent()
+    sim.initDefault()
+    model = sim.getModel()
+    length = 15.0 / elements
+    points = [np.array([i * length, 0.0, 0.0]) for i in range(elements + 1)]
+    # A frame's third axis lies along the thread. Orientations have inertias of 1 by themselves.
+    along = Quaternion(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+    edges = [i for e in range(elements) for i in (e, e + 1)]
+    model.addLineModel(elements + 1, elements, points, [along] * elements, edges, list(range(elements)))
+    particles = model.getParticles()
+    for i in range(elements + 1):
+        particles.setMass(i, 1.0 if i else 0.0)
+    for e in range(elements):
+        model.addStretchShearConstraint(e, e + 1, e, 1.0, 1.0, 1.0)
+    for e in range(elements - 1):
+        model.addBendTwistConstraint(e, e + 1, 0.5, 0.5, 0.5)
+    if len(model.getConstraints()) != 2 * elements - 1:
+        raise RuntimeError("pypbd refused the thread")
+    step = sim.getTimeStep()
+    controller = pbd.TimeStepController
+    step.setValueUInt(controller.NUM_SUB_STEPS, 1)
+    pbd.TimeManager.getCurrent().setTimeStepSize(FRAME)
+    ms = {20: [], 40: []}
+    for k in range(2 * frames):
+        iterations = 20 if k % 2 else 40
+        step.setValueUInt(controller.MAX_ITERATIONS, iterations)
+        start = time.thread_time()
+        step.step(model)
+        ms[iterations].append(1e3 * (time.thread_time() - start))
+    places = np.array([particles.getPosition(i) for i in range(elements + 1)])
+    few, many = (statistics.median(ms[n]) for n in (20, 40))
+    stretch = float(np.linalg.norm(np.diff(places, axis=0), axis=1).max()) / length - 1.0
+    return {"ns": (many - few) * 1e6 / (20 * elements), "ms": few, "stretch": stretch, "end": [float(v) for v in places[-1]]}
+
+
+def rods_in_sutura(elements, root):
+    """One round of the benchmark `paper`: ns an element and iteration, and ms a frame at 20 iterations, by order and whether with DDC."""
+    args = ["cargo", "bench", "--quiet", "-p", "sutura", "--bench", "paper", "--", str(elements)]
+    out = subprocess.run(args, check=True, capture_output=True, text=True, cwd=root).stdout
+    found = {}
+    for line in out.splitlines():
+        cells = line.split()
+        if cells and cells[0] == str(elements):
+            found[f"{cells[2]}{' with DDC' if cells[3] == 'true' else ''}"] = {"ms": float(cells[4]), "ns": float(cells[5])}
+    return found
+
+
+def compare_rods(args, python, one_core, root):
+    """The table of --rods."""
+    build_quaternion(python)
+    rows = []
+    for n in args.elements:
+        ours, theirs = [], []
+        for _ in range(args.rounds):
+            child = [str(python), __file__, "--child", "rods", "--elements", str(n), "--frames", str(args.frames)]
+            out = subprocess.run(child, check=True, capture_output=True, text=True, env=one_core, cwd=root).stdout
+            theirs.append(json.loads(out.strip().splitlines()[-1]))
+            ours.append(rods_in_sutura(n, root))
+        median = lambda runs, key: statistics.median(r[key] for r in runs)
+        row = {"elements": n, "pypbd": {key: median(theirs, key) for key in ("ns", "ms", "stretch")}, "pypbd_end": theirs[0]["end"]}
+        for kind in ours[0]:
+            runs = [o[kind] for o in ours]
+            times = statistics.median(t["ns"] / r["ns"] for t, r in zip(theirs, runs))
+            row[kind] = {"ns": median(runs, "ns"), "ms": median(runs, "ms"), "times": times}
+        rows.append(row)
+    if args.json:
+        print(json.dumps({"pypbd": PYPBD, "rods": rows}, indent=2))
+        return
+    print(f"ns an element and iteration (times faster than pypbd {PYPBD}), one core, medians of {args.rounds} alternating rounds")
+    kinds = ["natural", "natural with DDC", "two-color", "two-color with DDC"]
+    print(f"{'elements':>8} {'pypbd':>7} " + " ".join(f"{kind:>18}" for kind in kinds))
+    for r in rows:
+        cells = [f"{r[kind]['ns']:.1f} ({r[kind]['times']:.1f})" for kind in kinds]
+        print(f"{r['elements']:>8} {r['pypbd']['ns']:>7.1f} " + " ".join(f"{cell:>18}" for cell in cells))
 
 
 def drop_in_pypbd(elements, frames):
@@ -117,21 +244,26 @@ def main():
     parser.add_argument("--sutura", default=str(target / "release" / "sutura"), help="the program to measure [default: the release build]")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--frames", type=int, default=120)
-    parser.add_argument("--elements", type=int, nargs="+", default=[40, 120, 500, 2000])
+    parser.add_argument("--elements", type=int, nargs="+", help="[default: 40, 120, 500, and with the direct solver 2000]")
+    parser.add_argument("--rods", action="store_true", help="the solver of the 2018 paper beside pypbd's Cosserat rods")
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--drop", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--child", choices=["drop", "rods"], help=argparse.SUPPRESS)
     args = parser.parse_args()
-    if args.drop:
-        print(json.dumps(drop_in_pypbd(args.elements[0], args.frames)))
+    if args.child:
+        print(json.dumps({"drop": drop_in_pypbd, "rods": rods_in_pypbd}[args.child](args.elements[0], args.frames)))
         return
+    args.elements = args.elements or [40, 120, 500] + ([] if args.rods else [2000])
     python = python_with_pypbd()
     # More than one thread costs pypbd 40 times as much CPU.
     one_core = {**os.environ, "OMP_NUM_THREADS": "1"}
+    if args.rods:
+        compare_rods(args, python, one_core, here)
+        return
     rows, machine = [], ""
     for n in args.elements:
         ours, theirs = [], []
         for _ in range(args.rounds):
-            child = [str(python), __file__, "--drop", "--elements", str(n), "--frames", str(args.frames)]
+            child = [str(python), __file__, "--child", "drop", "--elements", str(n), "--frames", str(args.frames)]
             out = subprocess.run(child, check=True, capture_output=True, text=True, env=one_core, cwd=here).stdout
             theirs.append(json.loads(out.strip().splitlines()[-1]))
             ours.append(drop_in_sutura(args.sutura, n, args.frames))

@@ -5,12 +5,14 @@
 mod constraints;
 mod contact;
 mod ddc;
+mod number;
+mod sweep;
 
 use crate::math::Pose;
 use crate::model::Model;
 use crate::model::grip::{Drive, Hold};
 use crate::model::shape::ShapeMotion;
-use crate::params::{PaperSettings, SweepOrder};
+use crate::params::PaperSettings;
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
 use crate::state::{Onset, State};
@@ -20,6 +22,7 @@ use constraints::{BendTwist, StretchShear};
 use contact::{Contacts, Motion};
 use ddc::Chain;
 use glam::{DQuat, DVec3};
+use sweep::Sweep;
 
 /// Working memory.
 #[derive(Default)]
@@ -27,9 +30,7 @@ pub(crate) struct Work {
     /// Zero where a grip holds.
     inverse_mass: Vec<f64>,
     inverse_inertia: Vec<f64>,
-    /// Of each element and of the joint before it.
-    stretch: Vec<StretchShear>,
-    joint: Vec<BendTwist>,
+    sweep: Sweep,
     chain: Chain,
     contacts: Contacts,
 }
@@ -90,7 +91,7 @@ fn unknown(model: &Model, state: &State) -> Option<&'static str> {
 /// Inverse masses, and all of the constraints that does not change in a step.
 fn weigh(model: &Model, state: &State, work: &mut Work, p: &PaperSettings) {
     let n = model.mass.len();
-    let Work { inverse_mass: w, inverse_inertia: wq, stretch, joint, chain, .. } = work;
+    let Work { inverse_mass: w, inverse_inertia: wq, sweep, chain, .. } = work;
     w.clear();
     w.extend(model.mass.iter().map(|m| 1.0 / m));
     wq.clear();
@@ -112,14 +113,15 @@ fn weigh(model: &Model, state: &State, work: &mut Work, p: &PaperSettings) {
             Hold::Jaw => (w[i + 1], wq[i]) = (0.0, 0.0),
         }
     }
-    stretch.clear();
-    joint.clear();
-    for e in 0..n {
-        let own = model.is_element(e);
-        stretch.push(if own { StretchShear::new(model.rest_length[e], [w[e], w[e + 1]], wq[e], p.stretch_shear) } else { StretchShear::default() });
-        let pair = if model.is_joint(e) { [wq[e - 1], wq[e]] } else { [0.0, 0.0] };
-        joint.push(BendTwist::new(model.rest_half[e] * model.rest_half[e], pair, DVec3::new(p.bend[0], p.bend[1], p.twist)));
-    }
+    sweep.set(
+        p.order,
+        (0..n).map(|e| {
+            let (l, ends) = if model.is_element(e) { (model.rest_length[e], [w[e], w[e + 1]]) } else { (1.0, [0.0, 0.0]) };
+            let pair = if model.is_joint(e) { [wq[e - 1], wq[e]] } else { [0.0, 0.0] };
+            let rest = model.rest_half[e] * model.rest_half[e];
+            (StretchShear::new(l, ends, wq[e], p.stretch_shear), BendTwist::new(rest, pair, DVec3::new(p.bend[0], p.bend[1], p.twist)))
+        }),
+    );
     chain.resize(n);
 }
 
@@ -196,33 +198,10 @@ fn hold(model: &Model, state: &mut State, interval: &Interval<'_>, t: f64) {
 /// One iteration over all constraints.
 fn project(model: &Model, state: &mut State, work: &mut Work, p: &PaperSettings) {
     let (x, q) = (&mut state.position[..], &mut state.orientation[..]);
-    let (stretch, joint) = (&work.stretch[..], &work.joint[..]);
     for (_, rod) in model.rods.iter() {
-        let elements = rod.elements();
-        match p.order {
-            SweepOrder::Natural => {
-                for e in elements.clone() {
-                    stretch[e].project(&mut x[e..e + 2], &mut q[e]);
-                }
-                for e in elements.clone().skip(1) {
-                    joint[e].project(&mut q[e - 1..=e]);
-                }
-            }
-            SweepOrder::TwoColor => {
-                for color in 0..2 {
-                    for e in elements.clone().skip(color).step_by(2) {
-                        stretch[e].project(&mut x[e..e + 2], &mut q[e]);
-                    }
-                }
-                for color in 1..3 {
-                    for e in elements.clone().skip(color).step_by(2) {
-                        joint[e].project(&mut q[e - 1..=e]);
-                    }
-                }
-            }
-        }
+        let (particles, elements) = (rod.particles(), rod.elements());
+        work.sweep.project(p.order, elements.clone(), &mut x[particles.clone()], &mut q[elements.clone()]);
         if p.direct_distance {
-            let particles = rod.particles();
             work.chain.project(&mut x[particles.clone()], &work.inverse_mass[particles], &model.rest_length[elements]);
         }
     }

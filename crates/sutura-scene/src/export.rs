@@ -144,7 +144,7 @@ pub struct Exporter {
     header: Header,
     options: Options,
     out: Output,
-    writer: Option<Writer>,
+    writer: Option<Box<dyn Writer>>,
     format: Format,
     /// Number of the next moment by the rate.
     due: u64,
@@ -152,11 +152,10 @@ pub struct Exporter {
     seen: Option<(f64, f64)>,
 }
 
-enum Writer {
-    Glb(glb::Glb),
-    Vtk(vtk::Vtk),
-    Obj(obj::Obj),
-    Csv(csv::Csv),
+/// A kind of file as it is written.
+trait Writer {
+    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError>;
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError>;
 }
 
 /// Writes files and counts their bytes.
@@ -212,20 +211,14 @@ impl Exporter {
             None => {
                 let looks = || Looks::new(&self.header, moment, &self.options);
                 self.writer.insert(match self.format {
-                    Format::Glb => Writer::Glb(glb::Glb::new(looks()?, &self.header)),
-                    Format::Vtk => Writer::Vtk(vtk::Vtk::new(looks()?)),
-                    Format::Obj => Writer::Obj(obj::Obj::new(looks()?, &self.header)),
-                    Format::Csv => Writer::Csv(csv::Csv::new()),
+                    Format::Glb => Box::new(glb::Glb::new(looks()?, &self.header)),
+                    Format::Vtk => Box::new(vtk::Vtk::new(looks()?)),
+                    Format::Obj => Box::new(obj::Obj::new(looks()?, &self.header)),
+                    Format::Csv => Box::new(csv::Csv::new()),
                 })
             }
         };
-        match writer {
-            Writer::Glb(w) => w.add(&fitted(&self.header, moment)),
-            Writer::Vtk(w) => w.add(&self.header, moment, &mut self.out)?,
-            Writer::Obj(w) => w.add(&fitted(&self.header, moment), &mut self.out)?,
-            Writer::Csv(w) => w.add(&self.header, moment),
-        }
-        Ok(())
+        writer.add(&self.header, moment, &mut self.out)
     }
 
     /// Writes what is left to write.
@@ -234,12 +227,7 @@ impl Exporter {
             let (first, last) = self.seen.unwrap_or((0.0, 0.0));
             return Err(ExportError::Nothing { from: self.options.from, to: self.options.to, first, last });
         };
-        match writer {
-            Writer::Glb(w) => w.finish(&mut self.out)?,
-            Writer::Vtk(w) => w.finish(&mut self.out)?,
-            Writer::Obj(w) => w.finish(&mut self.out)?,
-            Writer::Csv(w) => w.finish(&mut self.out)?,
-        }
+        writer.finish(&mut self.out)?;
         Ok(Written { moments: self.moments, bytes: self.out.bytes })
     }
 }
@@ -334,7 +322,7 @@ fn tube(thread: &Thread, strand: &Strand) -> SkinSpec {
 fn fitted(header: &Header, moment: &Moment) -> Moment {
     let mut fitted = moment.clone();
     for (thread, strand) in header.threads.iter().zip(&mut fitted.threads) {
-        refit(thread.elements, &mut strand.positions, &mut strand.orientations, |a, b, u| a.lerp(b, u));
+        refit(thread.elements, &mut strand.positions, &mut strand.orientations, DVec3::lerp);
     }
     fitted
 }

@@ -306,7 +306,8 @@ pub struct Presets {
 /// Measure the speed of this build on this machine.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied and a plectoneme is wound. \
+A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; swings are compared with their path; the tube that \
+draws a thread is posed; then the overhand and the square knot are tied and a plectoneme is wound. \
 Times are CPU times of the solver on one core; the median of a frame is the number to compare. Build with --release.
 
 Examples:

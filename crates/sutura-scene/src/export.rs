@@ -49,11 +49,13 @@ pub struct Options {
     pub sides: u32,
     /// Rings of vertices an element.
     pub rings: u32,
+    /// Direction of the scene that is up where glTF says what is up, a unit vector: y as in glTF turns nothing. Other formats are not turned.
+    pub up: DVec3,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { rate: 30.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4 }
+        Options { rate: 30.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4, up: DVec3::Y }
     }
 }
 
@@ -180,6 +182,9 @@ impl Exporter {
         if options.from.is_nan() || options.to.is_nan() || options.from > options.to {
             return bad(format!("from {} s to {} s: wanted the first time not after the last", options.from, options.to));
         }
+        if !options.up.is_normalized() {
+            return bad(format!("up is {}: wanted a unit vector", options.up));
+        }
         let out = Output { path: out.to_path_buf(), bytes: 0 };
         // Now, so that what cannot be written is found before the work.
         out.prepare(format)?;
@@ -211,7 +216,7 @@ impl Exporter {
             None => {
                 let looks = || Looks::new(&self.header, moment, &self.options);
                 self.writer.insert(match self.format {
-                    Format::Glb => Box::new(glb::Glb::new(looks()?, &self.header)),
+                    Format::Glb => Box::new(glb::Glb::new(looks()?, &self.header, self.options.up)),
                     Format::Vtk => Box::new(vtk::Vtk::new(looks()?)),
                     Format::Obj => Box::new(obj::Obj::new(looks()?, &self.header)),
                     Format::Csv => Box::new(csv::Csv::new()),

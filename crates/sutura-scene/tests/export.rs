@@ -68,7 +68,7 @@ fn export(t: &Trajectory, format: Format, out: &Path, options: Options) -> Resul
     Ok(exporter.finish()?.moments)
 }
 
-const ALL: Options = Options { rate: 60.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4 };
+const ALL: Options = Options { rate: 60.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4, up: DVec3::Y };
 
 /// A GLB file as the crate `gltf` reads it.
 struct Read {
@@ -220,6 +220,26 @@ fn shapes_that_move_are_animated_and_others_are_not() {
     assert!((bar.translations[t.frames.len() - 1][1] - 0.01).abs() < 1e-6, "the bar moved a centimeter");
     let (post, (at, _, _)) = animated("post");
     assert!(post.times.is_empty() && at == t.frames[0].shapes[0].0);
+}
+
+#[test]
+fn a_scene_can_be_set_upright() {
+    let folder = tempfile::tempdir().unwrap();
+    let t = recorded();
+    let path = folder.path().join("up.glb");
+    export(&t, Format::Glb, &path, Options { up: DVec3::Z, ..ALL }).unwrap();
+    let read = Read::new(&path);
+    let roots: Vec<_> = read.document.default_scene().unwrap().nodes().collect();
+    let upright = roots.iter().find(|n| n.name() == Some("upright")).unwrap();
+    let turn = Quat::from_array(upright.transform().decomposed().1);
+    assert!((turn * Vec3::Z - Vec3::Y).length() < 1e-6);
+    // Tubes stand at the root, all else is turned, and joints go the same way as before within that.
+    assert!(roots.iter().all(|n| n.skin().is_some() || n.index() == upright.index()));
+    assert_eq!(upright.children().count(), 2 + 3);
+    let silk = upright.children().find(|n| n.name() == Some("silk")).unwrap();
+    let keys = read.keys(&silk.children().next().unwrap(), t.frames.len());
+    let x = &t.frames.last().unwrap().positions[0];
+    assert!((wide(keys.translations[t.frames.len() - 1]) - (wide(x[0]) + wide(x[1])) * 0.5).length() < 1e-8);
 }
 
 #[test]

@@ -16,6 +16,7 @@ use gltf::json::validation::USize64;
 use gltf::json::{Accessor, Animation, Asset, Buffer, Image, Index, Material, Mesh, Node, Root, Scene, Skin, Texture, texture};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use sutura::glam::DVec3;
 use sutura::skin::{Bone, TriangleMesh};
 
 /// Paths of all nodes that may move.
@@ -23,6 +24,7 @@ pub struct Glb {
     looks: Looks,
     threads: Vec<String>,
     shapes: Vec<(String, bool)>,
+    up: DVec3,
     times: Vec<f64>,
     /// Of each bone of each thread, then of each shape.
     paths: Vec<Path>,
@@ -59,13 +61,14 @@ struct Document {
 }
 
 impl Glb {
-    pub fn new(looks: Looks, header: &Header) -> Self {
+    pub fn new(looks: Looks, header: &Header, up: DVec3) -> Self {
         let n: usize = looks.skins.iter().map(sutura::skin::Skin::n_bones).sum::<usize>() + looks.shapes.len();
         // What has no inside is seen from both sides.
         let open = |o: &ShapeOutline| matches!(o, ShapeOutline::Plane | ShapeOutline::Mesh { .. });
         Glb {
             threads: header.threads.iter().map(|t| t.name.clone()).collect(),
             shapes: header.shapes.iter().map(|s| (s.name.clone(), open(&s.outline))).collect(),
+            up,
             times: Vec::new(),
             paths: vec![Path::default(); n],
             looks,
@@ -120,7 +123,8 @@ impl Writer for Glb {
     fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
         let mut doc = Document { root: Root::default(), bytes: Vec::new() };
         doc.root.asset = Asset { generator: Some(format!("Sutura {}", env!("CARGO_PKG_VERSION"))), ..Asset::default() };
-        let mut scene_nodes = Vec::new();
+        // Skinned meshes go by their joints alone and stand beside what is turned.
+        let (mut scene_nodes, mut turned) = (Vec::new(), Vec::new());
         let mut moving: Vec<Index<Node>> = Vec::new();
         let mut paths = self.paths.iter();
         let texture = (!self.threads.is_empty()).then(|| doc.braid());
@@ -145,7 +149,8 @@ impl Writer for Glb {
             let more = [(Semantic::Joints(0), joints_accessor), (Semantic::Weights(0), weights)];
             let mesh = doc.mesh(name, skin.mesh(), material, &more);
             let tube = doc.root.push(Node { name: Some(format!("{name}.skin")), mesh: Some(mesh), skin: Some(skin_index), ..Node::default() });
-            scene_nodes.extend([parent, tube]);
+            turned.push(parent);
+            scene_nodes.push(tube);
         }
         for ((mesh, (name, open)), path) in self.looks.shapes.iter().zip(&self.shapes).zip(&mut paths) {
             let (color, metallic, roughness) = if *open { ([70, 120, 95], 0.0, 0.9) } else { ([196, 199, 205], 0.9, 0.35) };
@@ -153,9 +158,16 @@ impl Writer for Glb {
             let mesh = doc.mesh(name, mesh, material, &[]);
             let node = doc.node(name, path, Some(mesh));
             moving.push(node);
-            scene_nodes.push(node);
+            turned.push(node);
         }
         self.animate(&mut doc, &moving);
+        if self.up == DVec3::Y || turned.is_empty() {
+            scene_nodes.extend(turned);
+        } else {
+            let rotation = sutura::math::rotation_arc(self.up, DVec3::Y).as_quat().normalize();
+            let rotation = Some(UnitQuaternion(rotation.to_array()));
+            scene_nodes.push(doc.root.push(Node { name: Some("upright".into()), children: Some(turned), rotation, ..Node::default() }));
+        }
         let scene = doc.root.push(Scene { extensions: None, extras: Default::default(), name: None, nodes: scene_nodes });
         doc.root.scene = Some(scene);
         out.write(None, &doc.into_glb()?)

@@ -299,11 +299,11 @@ impl Looks {
             let spec = SkinSpec { sides: options.sides, rings: options.rings, ..tube(thread, strand) };
             skins.push(Skin::new(&spec).map_err(|source| ExportError::Tube { thread: thread.name.clone(), source })?);
         }
-        // A plane reaches half as far again as the threads at the beginning.
+        // A plane reaches three times as far as the threads at the beginning.
         let points = || first.threads.iter().flat_map(|t| &t.positions);
         let shape = |(shape, pose): (&crate::trajectory::Shape, &Pose)| {
             let reach = points().map(|x| (*x - pose.position).length()).fold(1e-2, f64::max);
-            shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 1.5 * reach)
+            shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 3.0 * reach)
         };
         Ok(Looks { skins, shapes: header.shapes.iter().zip(&first.shapes).map(shape).collect() })
     }

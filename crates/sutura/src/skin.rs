@@ -6,6 +6,30 @@
 //!
 //! Weights are those of a quadratic B-spline over three bones ([`Blend::Smooth`]). Where neighboring elements turn by an angle a, blending takes a part
 //! 1 - cos(a / 2) of the width in the plane of the bend and nothing of that across; a bone's scale gives both half of it back, so that the area stays.
+//!
+//! ```
+//! use sutura::glam::DVec3;
+//! use sutura::skin::{Bone, Skin, SkinSpec};
+//! use sutura::{Material, RodSpec, Settings, World};
+//!
+//! # fn main() -> Result<(), sutura::Error> {
+//! let mut world = World::new(Settings::default())?;
+//! let thread = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 100, 1e-4, Material::elastic(2e9, 1150.0));
+//! let rod = world.insert_rod(&thread)?;
+//! let skin = Skin::new(&SkinSpec { sides: 8, ..SkinSpec::of(&world.rod(rod)?) })?;
+//! let mut bones = vec![Bone::default(); skin.n_bones()];
+//!
+//! // Each frame: the bones, to the graphics processor with `joints`, `weights` and `bind` of the skin ...
+//! world.step(1.0 / 60.0);
+//! skin.bones(&world.rod(rod)?, &mut bones);
+//!
+//! // ... or the vertices.
+//! let mut positions = vec![[0.0; 3]; skin.n_vertices()];
+//! let mut normals = vec![[0.0; 3]; skin.n_vertices()];
+//! skin.pose(&bones, &mut positions, &mut normals);
+//! # Ok(())
+//! # }
+//! ```
 
 use crate::error::{Error, check};
 use crate::math::{Pose, exp};

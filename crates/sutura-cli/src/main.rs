@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod export;
 mod knot;
 mod knot_strength;
 mod map;
@@ -38,6 +39,7 @@ fn main() -> ExitCode {
         Some(Command::Validate(a)) => validate::validate(&a),
         Some(Command::Paper(a)) => paper::paper(&a),
         Some(Command::Replay(a)) => replay::replay(&a),
+        Some(Command::Export(a)) => export::export(&a).map(|()| true),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

@@ -5,6 +5,10 @@
 //! files are the caller's. What is found depends on nothing but the code; times do, and are kept apart ([`Table::measured`]).
 
 mod fig08;
+mod fig16;
+mod fig17;
+mod fig18;
+mod led;
 mod measure;
 mod method;
 mod outcome;
@@ -17,5 +21,5 @@ pub use plan::{Experiment, Progress, Result, run};
 
 /// All experiments, in the order of the figures.
 pub fn experiments() -> Vec<Experiment> {
-    vec![fig08::EXPERIMENT]
+    vec![fig08::EXPERIMENT, fig16::EXPERIMENT, fig17::EXPERIMENT, fig18::EXPERIMENT]
 }

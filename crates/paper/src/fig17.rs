@@ -1,6 +1,6 @@
 //! Row E-17, figure 17: a throw around a cylinder and a spiral winding, held by friction (the sample scenes `throw_on_cylinder` and `spiral_winding`).
 
-use crate::led::{self, Moment, Run, SCALED, TRUE, find, verdict};
+use crate::led::{self, Moment, Run, SCALED, TRUE, find, moved};
 use crate::measure::{mm, number};
 use crate::outcome::{Check, Compare, Outcome};
 use crate::plan::{Experiment, Plan};
@@ -30,9 +30,9 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
         out.compare.push(Compare {
             what: format!("17: {what}, slip"),
             published: "no relative slip".into(),
-            effective: verdict(scaled),
-            true_scale: verdict(real),
-            direct: verdict(direct),
+            effective: moved(scaled),
+            true_scale: moved(real),
+            direct: moved(direct),
         });
         let mut check = |what: String, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
         check(format!("direct, {what}: drift in 3 s"), "<= 0.05 mm", mm(direct.drift), direct.drift <= 5e-5);
@@ -47,21 +47,21 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
         out.tables.extend([led::table(name, &format!("Runs of the {what}"), runs), led::times(&format!("{name}_times"), runs)]);
     }
     let (look, across) = ((DVec3::new(-0.4, 0.5, -1.0), DVec3::Y), (DVec3::new(-0.8, 0.5, -0.7), DVec3::Y));
-    let wide = Some((DVec3::new(0.0, -0.03, 0.0), 0.16));
-    let near = Some((DVec3::new(0.0, -0.003, 0.0), 0.03));
+    let wide = DVec3::new(0.0, -0.04, 0.0);
+    let near = DVec3::new(0.0, -0.003, 0.0);
     let moments = [
-        Moment { phase: "around the post", words: "around it", look, frame: wide },
-        Moment { phase: "first throw", words: "throw", look, frame: wide },
-        Moment { phase: "first draw", words: "drawn", look, frame: near },
-        Moment { phase: "hold", words: "held", look, frame: near },
+        Moment { phase: "around the post", words: "around it", look, at: wide, width: 0.12 },
+        Moment { phase: "first throw", words: "throw", look, at: wide, width: 0.12 },
+        Moment { phase: "first draw", words: "drawn", look, at: near, width: 0.03 },
+        Moment { phase: "hold", words: "held", look, at: near, width: 0.03 },
     ];
     let finest = throw.last().expect("there are runs");
     out.pictures.push(led::picture("throw", "The throw", &[find(throw, "direct"), find(throw, SCALED), finest], &moments));
-    let close = Some((DVec3::new(0.0, 0.0, 0.002), 0.02));
+    let near = DVec3::new(0.0, 0.0, 0.002);
     let moments = [
-        Moment { phase: "wind", words: "wound", look: across, frame: close },
-        Moment { phase: "settle", words: "pulled", look: across, frame: close },
-        Moment { phase: "hold", words: "held", look: across, frame: close },
+        Moment { phase: "wind", words: "wound", look: across, at: near, width: 0.02 },
+        Moment { phase: "settle", words: "pulled", look: across, at: near, width: 0.02 },
+        Moment { phase: "hold", words: "held", look: across, at: near, width: 0.02 },
     ];
     let finest = spiral.last().expect("there are runs");
     out.pictures.push(led::picture("spiral", "The spiral winding", &[find(spiral, "direct"), find(spiral, SCALED), finest], &moments));

@@ -1,6 +1,6 @@
 //! Row E-18, figure 18: three threads twined round each other (the sample scene `twine`).
 
-use crate::led::{self, Moment, Run, SCALED, TRUE, find, verdict};
+use crate::led::{self, Moment, Run, SCALED, TRUE, find, moved};
 use crate::measure::{mm, number, percent};
 use crate::outcome::{Check, Compare, Outcome};
 use crate::plan::{Experiment, Plan};
@@ -22,8 +22,8 @@ fn finish(runs: &[Run]) -> Outcome {
     );
     let [direct, scaled, real] = ["direct", SCALED, TRUE].map(|n| find(runs, n));
     let said = |r: &Run| match r.diverged {
-        Some(_) => verdict(r),
-        None => format!("{} contacts, {} of the particles in touch; {}", r.contacts, percent(r.touching), verdict(r)),
+        Some(_) => moved(r),
+        None => format!("{} contacts, {} of the particles in touch; {}", r.contacts, percent(r.touching), moved(r)),
     };
     out.compare.push(Compare {
         what: "18: three threads twined".into(),
@@ -46,9 +46,9 @@ fn finish(runs: &[Run]) -> Outcome {
     out.tables.extend([led::table("runs", "Runs of the three threads", runs), led::times("times", runs)]);
     let look = (DVec3::new(0.0, 1.0, -0.3), DVec3::Z);
     let moments = [
-        Moment { phase: "twine", words: "twined", look, frame: Some((DVec3::ZERO, 0.044)) },
-        Moment { phase: "hold", words: "held", look, frame: Some((DVec3::ZERO, 0.044)) },
-        Moment { phase: "hold", words: "held, middle", look, frame: Some((DVec3::ZERO, 0.012)) },
+        Moment { phase: "twine", words: "twined", look, at: DVec3::ZERO, width: 0.044 },
+        Moment { phase: "hold", words: "held", look, at: DVec3::ZERO, width: 0.044 },
+        Moment { phase: "hold", words: "held, middle", look, at: DVec3::ZERO, width: 0.008 },
     ];
     let finest = runs.last().expect("there are runs");
     out.pictures.push(led::picture("twine", "Three threads twined", &[direct, scaled, finest], &moments));

@@ -2,7 +2,8 @@
 //!
 //! The paper's solver knows no forces, so that it cannot draw an end until it pulls back with 2 N. What the hands do is taken from the run of the other: which places
 //! of the thread are held, for which frames, and which way each goes; also which way shapes go that a force moves. A grip takes hold of the thread where it
-//! then is, and makes the way that it makes in the other run.
+//! then is, and makes the way that it makes in the other run. Threads that do not stretch cannot go the way of threads that do: ends are set back by as much as the
+//! thread is longer than at rest.
 
 use crate::measure::{EFFECTIVE, FRAME, length, mm, number, percent, sane};
 use crate::outcome::{Cell, Panel, Picture, Solid, Table, Tube};
@@ -11,13 +12,18 @@ use sutura::audit::Audit;
 use sutura::glam::DVec3;
 use sutura::knot::{self, Ends, Entries};
 use sutura::{
-    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, PaperSettings, Place, Pose, RestShape, RodSpec, RodView, Settings, ShapeMotion, ShapeSpec,
-    Solver, View, World,
+    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, PaperSettings, Place, Pose, RodSpec, RodView, Settings, ShapeMotion, ShapeSpec, Solver,
+    View, World,
 };
 use sutura_scene::{Runner, Scene, samples};
 
 /// Name of the last phase of these scenes, in which nothing is to move.
 const LAST: &str = "hold";
+
+/// Frames of it that the paper's solver goes through.
+const HELD: usize = 180;
+/// In place of the name of a phase: the frame before a run diverged.
+const BEFORE: &str = "before it diverged";
 
 /// A run of a sample scene, and what it leaves for others to follow.
 pub struct Lead {
@@ -32,8 +38,6 @@ pub struct Lead {
     frames: Vec<Hands>,
     /// Names of phases, and the frames after which they end.
     phases: Vec<(String, usize)>,
-    /// Greatest elongation of a thread as a whole.
-    elongation: f64,
 }
 
 /// A thread as it lies at first: straight.
@@ -167,7 +171,10 @@ fn which(rod: &RodView<'_>, held: bool) -> String {
 
 /// Part of the particles that are near another thread.
 fn touching(view: View<'_>) -> f64 {
-    let (mut near, mut all) = (0, 0);
+    if view.rods().count() < 2 {
+        return f64::NAN;
+    }
+    let (mut near, mut all) = (0_usize, 0_usize);
     for rod in view.rods() {
         for p in rod.positions() {
             all += 1;
@@ -204,7 +211,6 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         shape_poses: world.view().shapes().map(|s| s.pose).collect(),
         frames: Vec::new(),
         phases: Vec::new(),
-        elongation: 0.0,
     };
     let tied = world.view().rods().count() == 1;
     let elements = world.view().rods().map(|r| r.n_elements()).sum();
@@ -221,7 +227,7 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         let view = runner.world().view();
         for h in &mut held {
             let rod = view.rods().nth(h.thread).expect("threads stay");
-            h.at = rod.positions()[place(&rod, h.arc)];
+            h.at = set_back(&rod, place(&rod, h.arc));
         }
         lead.frames.push(Hands { grips: held.clone(), shapes: view.shapes().map(|s| s.pose).collect() });
         watch.look(view, progress.phase == LAST);
@@ -236,7 +242,6 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         held = taken(&runner, &held);
     }
     let (contacts, touching) = (runner.world().contacts().count() as u32, touching(runner.world().view()));
-    lead.elongation = watch.elongation;
     let report = runner.finish().report;
     let number = |v: Option<f64>| v.unwrap_or(f64::NAN);
     let passage = report.passages.first().and_then(|p| p.split(' ').next()?.parse().ok());
@@ -256,6 +261,17 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         ms: ms(cpu),
     };
     (lead, run)
+}
+
+/// Where a particle is; an end of a thread that is stretched is set back along it by half of what the thread is longer than at rest.
+fn set_back(rod: &RodView<'_>, i: usize) -> DVec3 {
+    let p = rod.positions();
+    let neighbor = match i {
+        0 => 1,
+        _ if i == rod.n_elements() => i - 1,
+        _ => return p[i],
+    };
+    p[i] + (p[neighbor] - p[i]).normalize() * (0.5 * (length(p) - rod.rest_length()).max(0.0))
 }
 
 /// The particle at a rest arc length.
@@ -279,15 +295,14 @@ fn taken(runner: &Runner, before: &[Held]) -> Vec<Held> {
         let all = view.rods().enumerate().flat_map(|(thread, rod)| rod.positions().iter().enumerate().map(move |(i, p)| (p.distance(at), thread, i)));
         let (_, thread, i) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let rod = view.rods().nth(thread)?;
-        let (arc, at) = (rod.arc(i), rod.positions()[i]);
+        let (arc, at) = (rod.arc(i), set_back(&rod, i));
         let old = before.iter().find(|h| h.grip == grip && h.thread == thread && h.arc == arc);
         Some(Held { grip, thread, arc, taken: old.map_or(at, |o| o.taken), at })
     };
     runner.frame().grips.into_iter().enumerate().filter_map(one).collect()
 }
 
-/// Leads the paper's solver along the way of a run, until it diverges. Its threads do not stretch: they are longer by as much as those of the run are ever
-/// stretched, so that they can go the same way.
+/// Leads the paper's solver along the way of a run, until it diverges; through the first three seconds of its last phase.
 pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run {
     let settings = Settings {
         solver: Solver::Paper(numbers),
@@ -298,7 +313,7 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
     const GOOD: &str = "what the scene has is valid";
     let mut world = World::new(settings).expect(GOOD);
     let mut elements = 0;
-    let rods: Vec<_> = lead.threads.iter().map(|t| world.insert_rod(&spheres(t, lead.elongation, &mut elements)).expect(GOOD)).collect();
+    let rods: Vec<_> = lead.threads.iter().map(|t| world.insert_rod(&spheres(t, &mut elements)).expect(GOOD)).collect();
     let shapes: Vec<_> = lead
         .shapes
         .iter()
@@ -318,7 +333,10 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
         rub(&mut world, 0.0);
     }
     audit.observe(world.view());
-    for (k, hands) in lead.frames.iter().enumerate() {
+    let last_from = lead.phases.iter().rev().nth(1).map_or(0, |p| p.1);
+    let end = lead.frames.len().min(last_from + HELD);
+    let mut before = shot(world.view(), BEFORE, false, false);
+    for (k, hands) in lead.frames.iter().take(end).enumerate() {
         if k == rough_from && k > 0 {
             rub(&mut world, numbers.friction);
         }
@@ -326,7 +344,7 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
         grips.retain(|(h, handle, _)| stays(h) || world.remove_grip(*handle).is_err());
         for h in &hands.grips {
             if !grips.iter().any(|(o, ..)| o.grip == h.grip) {
-                let spec = GripSpec::at_once(rods[h.thread], Place::Arc(h.arc * (1.0 + lead.elongation)), lead.hold);
+                let spec = GripSpec::at_once(rods[h.thread], Place::Arc(h.arc), lead.hold);
                 let handle = world.insert_grip(&spec).expect(GOOD);
                 grips.push((*h, handle, world.grip_pose(handle).expect(GOOD)));
             }
@@ -350,11 +368,12 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
             || !report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::Teleport { .. }))
         {
             diverged = Some(world.time());
+            shots.push(before);
             break;
         }
-        let before_last = lead.phases.iter().rev().nth(1).map_or(0, |p| p.1);
-        watch.look(world.view(), k + 1 >= before_last);
-        if let Some((phase, _)) = lead.phases.iter().find(|p| p.1 == k + 1) {
+        before = shot(world.view(), BEFORE, false, false);
+        watch.look(world.view(), k + 1 >= last_from);
+        if let Some((phase, _)) = lead.phases.iter().find(|p| p.1.min(end) == k + 1) {
             let total = |h: &Held| lead.threads[h.thread].from.distance(lead.threads[h.thread].to);
             let both = grips.iter().filter(|(h, ..)| h.arc == 0.0 || h.arc > 0.999 * total(h)).count() >= 2;
             shots.push(shot(world.view(), phase, tied, both));
@@ -380,13 +399,12 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
 }
 
 /// A thread as the paper wants it: spheres side by side.
-fn spheres(t: &Thread, longer: f64, elements: &mut usize) -> RodSpec {
+fn spheres(t: &Thread, elements: &mut usize) -> RodSpec {
     let n = (t.from.distance(t.to) / (2.0 * t.radius)).round();
     *elements += n as usize;
-    let points: Vec<DVec3> = (0..=n as usize).map(|i| t.from.lerp(t.to, i as f64 / n)).collect();
-    let rest = RestShape::Given { lengths: Some(vec![points[0].distance(points[1]) * (1.0 + longer); n as usize]), darboux: None };
+    let points = (0..=n as usize).map(|i| t.from.lerp(t.to, i as f64 / n)).collect();
     // Of the material it uses nothing: masses are all alike.
-    RodSpec { rest, ..RodSpec::new(points, t.radius, Material::elastic(1e9, 1e3)) }
+    RodSpec::new(points, t.radius, Material::elastic(1e9, 1e3))
 }
 
 /// A scene on both solvers: the run of Sutura's own, then those of the paper's.
@@ -469,13 +487,27 @@ pub fn times(name: &str, runs: &[Run]) -> Table {
     t
 }
 
-/// Moments of some runs: a row for each run.
+/// Moments of some runs: a row for each run. One that diverged is shown as it was in the frame before. Threads are drawn thicker where they would hardly be seen.
 pub fn picture(name: &str, title: &str, runs: &[&Run], moments: &[Moment]) -> Picture {
-    let panel = |r: &Run, m: &Moment| match r.at(m.phase) {
-        Some(shot) => shot.panel(format!("{}: {}", r.name, m.words), m.look, m.frame),
-        None => Panel { label: format!("{}: {}: diverged", r.name, m.words), tubes: Vec::new(), solids: Vec::new(), look: m.look, frame: m.frame },
-    };
-    let panels = runs.iter().flat_map(|r| moments.iter().map(move |m| panel(r, m))).collect();
+    let mut panels = Vec::new();
+    for r in runs {
+        let mut told = false;
+        for m in moments {
+            let (shot, label) = match (r.at(m.phase), r.diverged) {
+                (Some(shot), _) => (Some(shot), format!("{}: {}", r.name, m.words)),
+                (None, Some(t)) if !told => (r.at(BEFORE), format!("{}: diverges at {} s, the frame before", r.name, number(t))),
+                _ => (None, String::new()),
+            };
+            told |= r.at(m.phase).is_none();
+            let mut panel = Panel { label, tubes: Vec::new(), solids: Vec::new(), look: m.look, frame: Some((m.at, m.width)) };
+            if let Some(shot) = shot {
+                let good = shot.threads.iter().filter(|(p, _)| sane(p, 0.1));
+                panel.tubes = good.map(|(points, radius)| Tube { points: points.clone(), radius: radius.max(m.width / 400.0) }).collect();
+                panel.solids = shot.shapes.iter().map(|(geometry, pose)| Solid { geometry: geometry.clone(), pose: *pose }).collect();
+            }
+            panels.push(panel);
+        }
+    }
     Picture { name: name.into(), title: title.into(), columns: moments.len(), panels }
 }
 
@@ -483,11 +515,14 @@ pub fn picture(name: &str, title: &str, runs: &[&Run], moments: &[Moment]) -> Pi
 pub struct Moment {
     pub phase: &'static str,
     pub words: &'static str,
+    /// Direction in which one looks, and the one that is up.
     pub look: (DVec3, DVec3),
-    pub frame: Option<(DVec3, f64)>,
+    /// Point in the middle and width \[m\].
+    pub at: DVec3,
+    pub width: f64,
 }
 
-/// Passages, overlap and drift in words.
+/// Passages and overlap in words.
 pub fn verdict(r: &Run) -> String {
     if let Some(t) = r.diverged {
         return format!("diverges at {} s", number(t));
@@ -496,21 +531,13 @@ pub fn verdict(r: &Run) -> String {
         0 => "nothing passes through".to_string(),
         n => format!("{n}{} passages from {} s on", if n == 256 { " or more" } else { "" }, number(r.first_passage)),
     };
-    format!("{passages}; overlap {} of a diameter; drift {}", percent((-r.least()).max(0.0)), mm(r.drift))
+    format!("{passages}; overlap {} of a diameter", percent((-r.least()).max(0.0)))
 }
 
-impl Shot {
-    /// A picture of it.
-    pub fn panel(&self, label: String, look: (DVec3, DVec3), frame: Option<(DVec3, f64)>) -> Panel {
-        let good = self.threads.iter().filter(|(p, _)| sane(p, 0.1));
-        Panel {
-            label,
-            tubes: good.map(|(points, radius)| Tube { points: points.clone(), radius: *radius }).collect(),
-            solids: self.shapes.iter().map(|(geometry, pose)| Solid { geometry: geometry.clone(), pose: *pose }).collect(),
-            look,
-            frame,
-        }
-    }
+/// The same, and how far anything moved while it was held.
+pub fn moved(r: &Run) -> String {
+    let drift = if r.diverged.is_none() { format!("; drift {}", mm(r.drift)) } else { String::new() };
+    verdict(r) + &drift
 }
 
 impl Run {

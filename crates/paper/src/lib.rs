@@ -9,6 +9,7 @@ mod fig16;
 mod fig17;
 mod fig18;
 mod led;
+mod limits;
 mod measure;
 mod method;
 mod outcome;
@@ -21,5 +22,5 @@ pub use plan::{Experiment, Progress, Result, run};
 
 /// All experiments, in the order of the figures.
 pub fn experiments() -> Vec<Experiment> {
-    vec![fig08::EXPERIMENT, fig16::EXPERIMENT, fig17::EXPERIMENT, fig18::EXPERIMENT]
+    vec![fig08::EXPERIMENT, fig16::EXPERIMENT, fig17::EXPERIMENT, fig18::EXPERIMENT, limits::EXPERIMENT]
 }

@@ -63,15 +63,15 @@ fn finish(runs: &[Run]) -> Outcome {
     }
     out.tables.extend([knots, led::table("runs", "Runs of the square knot", runs), led::times("times", runs)]);
 
-    let look = (DVec3::new(-0.4, 0.5, -1.0), DVec3::Y);
+    let look = (DVec3::new(-0.1, 0.3, -1.0), DVec3::Y);
     let wide = DVec3::new(0.0, -0.04, 0.0);
     let near = DVec3::new(0.0, -0.004, 0.0);
     let moments = [
         Moment { phase: "first throw", words: "first throw", look, at: wide, width: 0.12 },
-        Moment { phase: "first draw", words: "first drawn", look, at: near, width: 0.024 },
+        Moment { phase: "first draw", words: "first drawn", look, at: near, width: 0.017 },
         Moment { phase: "second throw", words: "second throw", look, at: wide, width: 0.12 },
-        Moment { phase: "second draw", words: "tightened", look, at: near, width: 0.024 },
-        Moment { phase: "hold", words: "after 11 s of load", look, at: near, width: 0.024 },
+        Moment { phase: "second draw", words: "tightened", look, at: near, width: 0.017 },
+        Moment { phase: "hold", words: "after 11 s of load", look, at: near, width: 0.017 },
     ];
     out.pictures.push(led::picture("knot", "The square knot", &[direct, scaled, finest], &moments));
     out

@@ -46,14 +46,14 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
         );
         out.tables.extend([led::table(name, &format!("Runs of the {what}"), runs), led::times(&format!("{name}_times"), runs)]);
     }
-    let (look, across) = ((DVec3::new(-0.4, 0.5, -1.0), DVec3::Y), (DVec3::new(-0.8, 0.5, -0.7), DVec3::Y));
+    let (look, across) = ((DVec3::new(-0.1, 0.3, -1.0), DVec3::Y), (DVec3::new(-0.8, 0.5, -0.7), DVec3::Y));
     let wide = DVec3::new(0.0, -0.04, 0.0);
     let near = DVec3::new(0.0, -0.003, 0.0);
     let moments = [
         Moment { phase: "around the post", words: "around it", look, at: wide, width: 0.12 },
         Moment { phase: "first throw", words: "throw", look, at: wide, width: 0.12 },
-        Moment { phase: "first draw", words: "drawn", look, at: near, width: 0.03 },
-        Moment { phase: "hold", words: "held", look, at: near, width: 0.03 },
+        Moment { phase: "first draw", words: "drawn", look, at: near, width: 0.017 },
+        Moment { phase: "hold", words: "held", look, at: near, width: 0.017 },
     ];
     let finest = throw.last().expect("there are runs");
     out.pictures.push(led::picture("throw", "The throw", &[find(throw, "direct"), find(throw, SCALED), finest], &moments));

@@ -46,8 +46,8 @@ fn finish(runs: &[Run]) -> Outcome {
     out.tables.extend([led::table("runs", "Runs of the three threads", runs), led::times("times", runs)]);
     let look = (DVec3::new(0.0, 1.0, -0.3), DVec3::Z);
     let moments = [
-        Moment { phase: "twine", words: "twined", look, at: DVec3::ZERO, width: 0.044 },
-        Moment { phase: "hold", words: "held", look, at: DVec3::ZERO, width: 0.044 },
+        Moment { phase: "twine", words: "twined", look, at: DVec3::ZERO, width: 0.024 },
+        Moment { phase: "hold", words: "held", look, at: DVec3::ZERO, width: 0.024 },
         Moment { phase: "hold", words: "held, middle", look, at: DVec3::ZERO, width: 0.008 },
     ];
     let finest = runs.last().expect("there are runs");

@@ -495,7 +495,7 @@ pub fn picture(name: &str, title: &str, runs: &[&Run], moments: &[Moment]) -> Pi
         for m in moments {
             let (shot, label) = match (r.at(m.phase), r.diverged) {
                 (Some(shot), _) => (Some(shot), format!("{}: {}", r.name, m.words)),
-                (None, Some(t)) if !told => (r.at(BEFORE), format!("{}: diverges at {} s, the frame before", r.name, number(t))),
+                (None, Some(t)) if !told => (r.at(BEFORE), format!("{}: diverges at {} s", r.name, number(t))),
                 _ => (None, String::new()),
             };
             told |= r.at(m.phase).is_none();
@@ -549,5 +549,45 @@ impl Run {
     pub fn least(&self) -> f64 {
         // A clearance that is no number is that of nothing near.
         self.clearance[0].min(self.clearance[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A thread led by both ends makes their way, and one let go stays behind.
+    #[test]
+    fn hands_lead_and_let_go() {
+        let (from, to) = (DVec3::ZERO, DVec3::X * 0.02);
+        let hands = |k: usize| {
+            let way = DVec3::Y * (1e-3 * k as f64);
+            let one = |grip: usize, arc: f64, taken: DVec3| Held { grip, thread: 0, arc, taken, at: taken + way };
+            let mut grips = vec![one(0, 0.0, from)];
+            if k <= 5 {
+                grips.push(one(1, 0.02, to));
+            }
+            Hands { grips, shapes: Vec::new() }
+        };
+        let lead = Lead {
+            hold: Hold::Pin,
+            settings: Settings { gravity: DVec3::ZERO, linear_damping: 0.999_999, ..Settings::default() },
+            threads: vec![Thread { from, to, radius: 5e-4 }],
+            shapes: Vec::new(),
+            shape_poses: Vec::new(),
+            frames: (1..=10).map(hands).collect(),
+            phases: vec![("both".into(), 5), (LAST.into(), 10)],
+        };
+        let run = paper(&lead, "paper", PaperSettings::default(), Pace { steps: 10, gravity: 1.0, smooth_until: None });
+        assert_eq!((run.elements, run.diverged, run.passages), (20, None, 0));
+        let ends = |phase: &str| {
+            let points = &run.at(phase).expect("it was reached").threads[0].0;
+            (points[0], points[20])
+        };
+        let (a, b) = ends("both");
+        assert!(a.distance(DVec3::Y * 5e-3) < 1e-12 && b.distance(to + DVec3::Y * 5e-3) < 1e-12, "{a} {b}");
+        let (a, b) = ends(LAST);
+        assert!(a.distance(DVec3::Y * 1e-2) < 1e-12 && b.distance(to + DVec3::Y * 1e-2) > 1e-3, "{a} {b}");
+        assert!(run.elongation[0].abs() < 1e-3, "{:?}", run.elongation);
     }
 }

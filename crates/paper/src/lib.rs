@@ -24,3 +24,42 @@ pub use plan::{Experiment, Progress, Result, run};
 pub fn experiments() -> Vec<Experiment> {
     vec![fig08::EXPERIMENT, fig16::EXPERIMENT, fig17::EXPERIMENT, fig18::EXPERIMENT, limits::EXPERIMENT]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Plan;
+
+    #[test]
+    fn names_are_unique() {
+        let mut names: Vec<&str> = experiments().iter().map(|e| e.name).collect();
+        names.sort_unstable();
+        let n = names.len();
+        names.dedup();
+        assert_eq!(names.len(), n);
+        assert!(!names.contains(&"all"), "that means all of them");
+    }
+
+    #[test]
+    fn what_is_found_does_not_hang_on_the_number_of_jobs() {
+        fn tiny() -> Plan {
+            let finish = |found: Vec<(f64, f64)>| {
+                let mut t = Table::new("roots", "Roots", &["x", "root, of x"]);
+                for (x, root) in found {
+                    t.row([x.into(), root.into()]);
+                }
+                Outcome { tables: vec![t], ..Outcome::default() }
+            };
+            let cases = |from: u32| (from..from + 20).map(f64::from).collect::<Vec<_>>();
+            Plan::new(cases(0), f64::to_string, |x| x.sqrt(), finish).and(Plan::new(cases(20), f64::to_string, |x| x.sqrt(), finish))
+        }
+        let csv = |jobs: usize| {
+            let one = Experiment { name: "tiny", title: "", figures: "", plan: tiny };
+            let found = run(&[one], jobs, &|_| ());
+            found[0].outcome.tables.iter().map(Table::csv).collect::<Vec<_>>()
+        };
+        let once = csv(1);
+        assert_eq!(once, csv(4));
+        assert!(once[0].starts_with("x,\"root, of x\"\n0,0\n1,1\n2,1.4142135623730951\n") && once[1].starts_with("x,\"root, of x\"\n20,"), "{once:?}");
+    }
+}

@@ -3,7 +3,7 @@
 //! The paper's solver knows no forces, so that it cannot draw an end until it pulls back with 2 N. What the hands do is taken from the run of the other: which places
 //! of the thread are held, for which frames, and which way each goes; also which way shapes go that a force moves. A grip takes hold of the thread where it
 //! then is, and makes the way that it makes in the other run. Threads that do not stretch cannot go the way of threads that do: ends are set back by as much as the
-//! thread is longer than at rest.
+//! thread is longer than at rest, or by more, so that what happens is not owed to a thread pulled longer than it is.
 
 use crate::measure::{EFFECTIVE, FRAME, length, mm, number, percent, sane};
 use crate::outcome::{Cell, Panel, Picture, Solid, Table, Tube};
@@ -195,8 +195,8 @@ fn ms(mut frames: Vec<f64>) -> [f64; 2] {
     [1e3 * mean, 1e3 * frames[frames.len() / 2]]
 }
 
-/// Runs a sample scene as it is. `hold` is how its grips hold.
-pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
+/// Runs a sample scene as it is. `hold` is how its grips hold; each end of a thread is led as far as `share` of its stretch allows.
+pub fn direct(name: &str, hold: Hold, share: f64) -> (Lead, Run) {
     let sample = samples().iter().find(|s| s.name == name).expect("it is a sample scene");
     let scene = Scene::parse(sample.text, name).expect("sample scenes are valid");
     assert!((scene.frame_rate() * FRAME - 1.0).abs() < 1e-12, "frames of 1/60 s");
@@ -216,7 +216,7 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
     let elements = world.view().rods().map(|r| r.n_elements()).sum();
     let (mut watch, mut shots, mut cpu) = (Watch::default(), Vec::new(), Vec::new());
     let mut phase = String::new();
-    let mut held = taken(&runner, &[]);
+    let mut held = taken(&runner, &[], share);
     loop {
         let progress = runner.step_frame();
         cpu.push(1e-3 * progress.ms);
@@ -227,7 +227,7 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         let view = runner.world().view();
         for h in &mut held {
             let rod = view.rods().nth(h.thread).expect("threads stay");
-            h.at = set_back(&rod, place(&rod, h.arc));
+            h.at = set_back(&rod, place(&rod, h.arc), share);
         }
         lead.frames.push(Hands { grips: held.clone(), shapes: view.shapes().map(|s| s.pose).collect() });
         watch.look(view, progress.phase == LAST);
@@ -239,7 +239,7 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
         if progress.finished {
             break;
         }
-        held = taken(&runner, &held);
+        held = taken(&runner, &held, share);
     }
     let (contacts, touching) = (runner.world().contacts().count() as u32, touching(runner.world().view()));
     let report = runner.finish().report;
@@ -263,15 +263,15 @@ pub fn direct(name: &str, hold: Hold) -> (Lead, Run) {
     (lead, run)
 }
 
-/// Where a particle is; an end of a thread that is stretched is set back along it by half of what the thread is longer than at rest.
-fn set_back(rod: &RodView<'_>, i: usize) -> DVec3 {
+/// Where a particle is; an end of a thread that is stretched is set back along it by `share` of what the thread is longer than at rest.
+fn set_back(rod: &RodView<'_>, i: usize, share: f64) -> DVec3 {
     let p = rod.positions();
     let neighbor = match i {
         0 => 1,
         _ if i == rod.n_elements() => i - 1,
         _ => return p[i],
     };
-    p[i] + (p[neighbor] - p[i]).normalize() * (0.5 * (length(p) - rod.rest_length()).max(0.0))
+    p[i] + (p[neighbor] - p[i]).normalize() * (share * (length(p) - rod.rest_length()).max(0.0))
 }
 
 /// The particle at a rest arc length.
@@ -287,7 +287,7 @@ fn place(rod: &RodView<'_>, arc: f64) -> usize {
 }
 
 /// What the grips of the scene hold now; `before` is what they held.
-fn taken(runner: &Runner, before: &[Held]) -> Vec<Held> {
+fn taken(runner: &Runner, before: &[Held], share: f64) -> Vec<Held> {
     let view = runner.world().view();
     let one = |(grip, at): (usize, Option<[f32; 3]>)| {
         let at = DVec3::from(at?.map(f64::from));
@@ -295,7 +295,7 @@ fn taken(runner: &Runner, before: &[Held]) -> Vec<Held> {
         let all = view.rods().enumerate().flat_map(|(thread, rod)| rod.positions().iter().enumerate().map(move |(i, p)| (p.distance(at), thread, i)));
         let (_, thread, i) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let rod = view.rods().nth(thread)?;
-        let (arc, at) = (rod.arc(i), set_back(&rod, i));
+        let (arc, at) = (rod.arc(i), set_back(&rod, i, share));
         let old = before.iter().find(|h| h.grip == grip && h.thread == thread && h.arc == arc);
         Some(Held { grip, thread, arc, taken: old.map_or(at, |o| o.taken), at })
     };
@@ -414,19 +414,18 @@ fn spheres(t: &Thread, elements: &mut usize) -> RodSpec {
 ///   diameters in a step as before.
 /// - Effective scale: a scene a hundred times as large, under the same gravity, in which the hands are as quick as what falls, so that all takes ten times as
 ///   long; ten steps where there was one (Froude's similarity: lengths as the square of times).
-/// - A finer one: thirty steps.
-pub fn all(name: &str, hold: Hold, finest: u32, smooth_until: Option<&'static str>) -> Vec<Run> {
-    let (lead, run) = direct(name, hold);
+/// - Other numbers of steps in a frame.
+pub fn all(name: &str, hold: Hold, share: f64, others: &[u32], smooth_until: Option<&'static str>) -> Vec<Run> {
+    let (lead, run) = direct(name, hold, share);
     let mut runs = vec![run];
-    let numbers = PaperSettings::default();
-    let mut go = |name: &str, steps: u32, gravity: f64| runs.push(paper(&lead, name, numbers, Pace { steps, gravity, smooth_until }));
+    let mut go = |name: &str, steps: u32, gravity: f64| runs.push(paper(&lead, name, PaperSettings::default(), Pace { steps, gravity, smooth_until }));
     go(TRUE, 1, 1.0);
     if lead.settings.gravity != DVec3::ZERO {
         go("paper, a hundredth of gravity", 1, 1.0 / EFFECTIVE);
     }
     go(SCALED, EFFECTIVE.sqrt() as u32, 1.0);
-    if finest > 10 {
-        go(&format!("paper, {finest} steps a frame"), finest, 1.0);
+    for steps in others {
+        go(&format!("paper, {steps} steps a frame"), *steps, 1.0);
     }
     runs
 }

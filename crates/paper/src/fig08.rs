@@ -258,7 +258,10 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         let e = error(c, a);
         sweep.row([c.method.name().into(), c.n.into(), c.method.budget().into(), e.into(), a.elongation.into()]);
         costs.row([c.method.name().into(), c.n.into(), c.method.budget().into(), e.into(), a.ms.into()]);
-        if c.role == Role::Sweep && !c.method.budget().starts_with("2 x") && (c.n != N || matches!(&c.method, Method::Direct(_) | Method::Der(_)) || c.method.budget() == "1 x 20") {
+        if c.role == Role::Sweep
+            && !c.method.budget().starts_with("2 x")
+            && (c.n != N || matches!(&c.method, Method::Direct(_) | Method::Der(_)) || c.method.budget() == "1 x 20")
+        {
             let name = format!("{}, {}", c.method.name(), c.method.budget());
             match lines.iter_mut().find(|l| l.0 == name) {
                 Some(l) => l.1.push((e, a.ms)),

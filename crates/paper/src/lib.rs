@@ -9,7 +9,12 @@ mod fig09;
 mod fig10;
 mod fig12;
 mod fig13;
+mod fig16;
+mod fig17;
+mod fig18;
 mod helix;
+mod led;
+mod limits;
 mod measure;
 mod method;
 mod outcome;
@@ -23,5 +28,54 @@ pub use plan::{Experiment, Progress, Result, run};
 
 /// All experiments, in the order of the figures.
 pub fn experiments() -> Vec<Experiment> {
-    vec![fig08::EXPERIMENT, fig09::EXPERIMENT, fig10::EXPERIMENT, fig12::EXPERIMENT, fig13::EXPERIMENT, scale::EXPERIMENT]
+    vec![
+        fig08::EXPERIMENT,
+        fig09::EXPERIMENT,
+        fig10::EXPERIMENT,
+        fig12::EXPERIMENT,
+        fig13::EXPERIMENT,
+        scale::EXPERIMENT,
+        fig16::EXPERIMENT,
+        fig17::EXPERIMENT,
+        fig18::EXPERIMENT,
+        limits::EXPERIMENT,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::Plan;
+
+    #[test]
+    fn names_are_unique() {
+        let mut names: Vec<&str> = experiments().iter().map(|e| e.name).collect();
+        names.sort_unstable();
+        let n = names.len();
+        names.dedup();
+        assert_eq!(names.len(), n);
+        assert!(!names.contains(&"all"), "that means all of them");
+    }
+
+    #[test]
+    fn what_is_found_does_not_hang_on_the_number_of_jobs() {
+        fn tiny() -> Plan {
+            let finish = |found: &[(f64, f64)]| {
+                let mut t = Table::new("roots", "Roots", &["x", "root, of x"]);
+                for (x, root) in found {
+                    t.row([(*x).into(), (*root).into()]);
+                }
+                Outcome { tables: vec![t], ..Outcome::default() }
+            };
+            Plan::new((0..20).map(f64::from).collect(), f64::to_string, |x| x.sqrt(), finish)
+        }
+        let csv = |jobs: usize| {
+            let one = Experiment { name: "tiny", title: "", figures: "", plan: tiny };
+            let found = run(&[one], jobs, &|_| ());
+            found[0].outcome.tables.iter().map(Table::csv).collect::<Vec<_>>()
+        };
+        let once = csv(1);
+        assert_eq!(once, csv(4));
+        assert!(once[0].starts_with("x,\"root, of x\"\n0,0\n1,1\n2,1.4142135623730951\n"), "{once:?}");
+    }
 }

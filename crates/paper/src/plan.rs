@@ -80,6 +80,31 @@ impl Plan {
         };
         Plan { cases: boxed, finish: Box::new(finish) }
     }
+    /// Both plans, as one experiment: what each finds, one after the other.
+    pub fn and(self, other: Plan) -> Plan {
+        let n = self.cases.len();
+        let mut cases = self.cases;
+        cases.extend(other.cases);
+        let finish = move |mut answers: Vec<Answer>| {
+            let later = answers.split_off(n);
+            let (mut first, second) = ((self.finish)(answers), (other.finish)(later));
+            first.add(second);
+            first
+        };
+        Plan { cases, finish: Box::new(finish) }
+    }
+}
+
+impl Outcome {
+    fn add(&mut self, other: Outcome) {
+        self.say(other.text);
+        self.compare.extend(other.compare);
+        self.checks.extend(other.checks);
+        self.tables.extend(other.tables);
+        self.plots.extend(other.plots);
+        self.grids.extend(other.grids);
+        self.pictures.extend(other.pictures);
+    }
 }
 
 /// Runs the experiments on `jobs` threads; `tell` hears of each case as it is done.

@@ -539,7 +539,7 @@ fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
     out.say(format!(
         "**F-4, Coulomb's law.** A thread on a plane with mu = 0.3 that tilts: *direct* rests below 16.7 degrees and slides above with g (sin - mu cos) to {}; round a cylinder tensions are in the ratio of the capstan to {}. \
          The paper's factor k is no coefficient of friction. Mean acceleration down the incline over half a second [m/s^2], ten steps in a frame of 1/60 s: on 5 degrees, where Coulomb's law gives 0, {}; on 30 degrees, where it gives {}, {}. \
-         With one step in a frame: {} and {}. What it gives hangs on the step and on how far the thread slides in one, not on the load.",
+         With one step in a frame: {} and {}. The same k gives another friction at another step.",
         percent(sliding),
         percent(ratio),
         of(TENTH, 5.0, &ks),

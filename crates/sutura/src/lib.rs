@@ -22,6 +22,7 @@ mod report;
 mod rod;
 mod row;
 mod scratch;
+pub mod skin;
 mod snapshot;
 mod state;
 mod step;

@@ -4,6 +4,7 @@ use crate::math::{Pose, log};
 use crate::model::Model;
 use crate::model::material::{Material, SectionStiffness};
 use crate::model::rod::RodModel;
+use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::state::State;
@@ -177,6 +178,22 @@ impl<'a> RodView<'a> {
     pub fn radius(&self) -> f64 {
         self.rod.radius
     }
+    /// Shape of the cross-section where its size is 1.
+    pub fn cross_section(&self) -> Section {
+        self.rod.section
+    }
+    /// Radius of a round section where its size is 1 \[m\].
+    pub fn section_radius(&self) -> f64 {
+        self.rod.section_radius
+    }
+    /// Factor on the size of the section along the thread.
+    pub fn size(&self) -> &'a Profile {
+        &self.rod.size
+    }
+    /// Of a closed thread, the turn about d3 at rest from its last frame to its first \[rad\], between -pi and pi.
+    pub fn seam_turn(&self) -> Option<f64> {
+        self.seam_rest().map(about_third)
+    }
     /// Axial stiffness E A of an element \[N\].
     pub fn axial_stiffness(&self, element: usize) -> f64 {
         self.section(element).ea
@@ -285,9 +302,7 @@ impl<'a> RodView<'a> {
         if let Some(rest) = self.seam_rest() {
             let (last, first) = (q[q.len() - 1], q[0]);
             let carried = crate::math::rotation_arc(last * DVec3::Z, first * DVec3::Z) * last;
-            // Of a rotation, the part about the third director.
-            let about = |q: DQuat| log(DQuat::from_xyzw(0.0, 0.0, q.z, q.w).normalize()).z;
-            angle += log(crate::math::exp(DVec3::Z * (about(carried.conjugate() * first) - about(rest)))).z;
+            angle += log(crate::math::exp(DVec3::Z * (about_third(carried.conjugate() * first) - about_third(rest)))).z;
         }
         angle / core::f64::consts::TAU
     }
@@ -307,4 +322,9 @@ impl<'a> RodView<'a> {
     pub fn momentum(&self) -> DVec3 {
         self.rod.particles().map(|i| self.state.velocity[i] * self.model.mass[i]).sum()
     }
+}
+
+/// Of a rotation, the part about the third director \[rad\].
+fn about_third(q: DQuat) -> f64 {
+    log(DQuat::from_xyzw(0.0, 0.0, q.z, q.w).normalize()).z
 }

@@ -3,7 +3,7 @@
 use crate::error::{Error, check};
 use crate::math::{exp, frame_from_tangent, half, log, rotation_arc};
 use crate::model::material::{Material, SectionStiffness};
-use crate::model::section::{Along, Section};
+use crate::model::section::{Along, Profile, Section};
 use glam::{DQuat, DVec3};
 
 /// A thread. Marker of [`Handle`](crate::Handle).
@@ -155,6 +155,10 @@ pub(crate) struct RodModel {
     pub n_elements: u32,
     /// With which it touches \[m\].
     pub radius: f64,
+    /// Cross-section as given, of this radius \[m\] where it is round, and the factor on its size: for who draws it.
+    pub section: Section,
+    pub section_radius: f64,
+    pub size: Profile,
     pub material: Material,
     pub stretch: Stretch,
     /// Whether it bends more easily one way than the other.

@@ -123,11 +123,11 @@ impl Profile {
         self.0.iter().map(|(_, v)| *v).reduce(f64::max).unwrap_or(1.0)
     }
 
-    fn validate(&self, field: &str) -> Result<(), Error> {
+    pub(crate) fn validate(&self, what: &'static str, field: &str) -> Result<(), Error> {
         for (i, (s, v)) in self.0.iter().enumerate() {
             let ascending = i == 0 || self.0[i - 1].0 < *s;
-            check("rod", &format!("{field}[{i}]"), *s, ascending, "finite arc lengths [m], ascending")?;
-            check("rod", &format!("{field}[{i}]"), *v, *v > 0.0, "a finite factor > 0")?;
+            check(what, &format!("{field}[{i}]"), *s, ascending, "finite arc lengths [m], ascending")?;
+            check(what, &format!("{field}[{i}]"), *v, *v > 0.0, "a finite factor > 0")?;
         }
         Ok(())
     }
@@ -135,9 +135,9 @@ impl Profile {
 
 impl Along {
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        self.size.validate("along.size")?;
-        self.modulus.validate("along.modulus")?;
-        self.density.validate("along.density")
+        self.size.validate("rod", "along.size")?;
+        self.modulus.validate("rod", "along.modulus")?;
+        self.density.validate("rod", "along.density")
     }
 }
 

@@ -12,7 +12,7 @@ use cpu_time::ThreadTime;
 use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
-use sutura::input::Recorder;
+use sutura::input::{Recorder, Recording};
 use sutura::{Geometry, Grip, Handle, IncidentKind, Rod, RodView, World};
 
 /// A scene being run.
@@ -414,6 +414,14 @@ impl Runner {
     /// The world, for what is done to it from outside the scene between frames.
     pub fn edit(&mut self) -> &mut Recorder {
         &mut self.stage.world
+    }
+    /// What was done to the world so far, where it is recorded.
+    pub fn recording_so_far(&self) -> Option<&Recording> {
+        self.stage.world.recording()
+    }
+    /// What went wrong so far.
+    pub fn incidents(&self) -> impl Iterator<Item = &IncidentReport> {
+        self.incidents.iter().map(|(_, report)| report)
     }
     /// The threads with their names.
     pub fn threads(&self) -> impl Iterator<Item = (&str, Handle<Rod>)> {

@@ -95,8 +95,8 @@ impl PhysicsClock {
             self.lost += self.owed - self.most_owed;
             self.owed = self.most_owed;
         }
-        // Sixty sixtieths are a second, whatever their sum rounds to.
-        (self.owed / self.frame + 1e-9) as u32
+        // A picture of 16.66 ms is one of a sixtieth: a frame may begin early by as little as that rounding.
+        (self.owed / self.frame + 1e-3) as u32
     }
 }
 

@@ -3,9 +3,10 @@
 use std::path::Path;
 use sutura_bevy::Simulation;
 use sutura_bevy::sutura::input::{Recorder, Recording};
-use sutura_bevy::sutura::{Geometry, Incident, World};
 use sutura_bevy::sutura::glam::DVec3;
-use sutura_scene::{Runner, Scene, ShapeOutline, Trajectory, samples};
+use sutura_bevy::sutura::skin::SkinSpec;
+use sutura_bevy::sutura::{Incident, Profile, World};
+use sutura_scene::{Runner, Scene, Thread, Trajectory, samples};
 
 /// A scene that is played. When its phases are over the world goes on by itself, for hands from outside.
 pub struct Play(pub Runner);
@@ -61,17 +62,19 @@ impl Source {
     }
 }
 
-/// Geometry of the engine from that of a recording.
-pub fn geometry(outline: &ShapeOutline) -> Geometry {
-    match outline {
-        ShapeOutline::Plane => Geometry::Plane,
-        ShapeOutline::Sphere { radius } => Geometry::Sphere { radius: *radius },
-        ShapeOutline::Capsule { radius, half_length } => Geometry::Capsule { radius: *radius, half_length: *half_length },
-        ShapeOutline::Cylinder { radius, half_length } => Geometry::Cylinder { radius: *radius, half_length: *half_length },
-        ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from_array(*half_sides) },
-        ShapeOutline::Mesh { vertices, triangles } => {
-            Geometry::Mesh { vertices: vertices.iter().map(|v| DVec3::from_array(*v)).collect(), triangles: triangles.clone() }
-        }
+/// The skin of a thread of a recording, whose first positions are these \[m\].
+pub fn skin(thread: &Thread, positions: &[[f32; 3]]) -> SkinSpec {
+    let place = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
+    // Recordings of earlier versions have no rest lengths.
+    let lengths = || positions.windows(2).map(|w| place(w[0]).distance(place(w[1])).max(1e-9)).collect();
+    match &thread.look {
+        Some(look) => SkinSpec {
+            section: look.section.into(),
+            size: Profile::new(look.size.clone()),
+            seam: look.seam,
+            ..SkinSpec::new(look.lengths.clone(), thread.radius)
+        },
+        None => SkinSpec::new(lengths(), thread.radius),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The scene on view: its things as entities, light, table, and frames that are remembered.
 
 use crate::camera::Orbit;
-use crate::source::{Play, Source, geometry};
+use crate::source::{Play, Source, skin};
 use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
 use sutura_bevy::look::{BodyLook, ThreadLook};
@@ -161,10 +161,8 @@ pub fn play(world: &mut World, runner: Runner) {
 fn replay(world: &mut World, trajectory: Trajectory) {
     let Trajectory { header, frames } = trajectory;
     for (i, thread) in header.threads.iter().enumerate() {
-        let x: Vec<DVec3> = frames[0].positions[i].iter().map(|p| place(*p)).collect();
-        let lengths: Vec<f64> = x.windows(2).map(|w| w[0].distance(w[1]).max(1e-9)).collect();
         let strand = Strand {
-            skin: SkinSpec::new(lengths, thread.radius),
+            skin: skin(thread, &frames[0].positions[i]),
             positions: Vec::new(),
             orientations: Vec::new(),
             tensions: Vec::new(),
@@ -174,7 +172,7 @@ fn replay(world: &mut World, trajectory: Trajectory) {
         world.spawn((strand, Name::new(thread.name.clone()), Prop(i)));
     }
     for (i, shape) in header.shapes.iter().enumerate() {
-        let solid = Solid { geometry: geometry(&shape.outline), pose: Pose::IDENTITY, look: BodyLook::Steel };
+        let solid = Solid { geometry: Geometry::from(&shape.outline), pose: Pose::IDENTITY, look: BodyLook::Steel };
         world.spawn((solid, Name::new(shape.name.clone()), Prop(i)));
     }
     world.insert_resource(Live(false));

@@ -21,6 +21,8 @@ Examples:
   sutura run capstan.toml       run it; pictures, plots and numbers go to out/capstan
   sutura knot out/capstan/trajectory.sutura
                                 say which knot a recording ends with
+  sutura export overhand --out overhand.glb
+                                a film for Blender, a browser or a game engine
 
 Exit codes: 0 all is well; 1 a check of the scene failed; 2 the input could not be used.";
 
@@ -43,6 +45,8 @@ pub enum Command {
     Validate(Validate),
     /// Do a recorded input again and compare the state after every step
     Replay(Replay),
+    /// Write a scene or a recording as glTF (GLB), VTK, OBJ or CSV, for other programs
+    Export(Export),
 }
 
 /// Run a scene: simulate, measure, check, plot and draw it.
@@ -416,6 +420,78 @@ pub struct Replay {
     /// Print nothing when all is the same
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Write a scene or a recording as glTF (GLB), VTK, OBJ or CSV, for other programs.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+SOURCE is a trajectory that `sutura run` wrote, or a scene, which is then run. Lengths are meters, in all formats.
+
+  glb   one file, glTF 2.0: each thread a skinned tube with a joint an element (the path of a joint is that of the middle of its element), with a \
+braid texture that shows twist; shapes as nodes; one animation. Blender, three.js, Bevy, Godot, Unity and Windows open it.
+  vtk   a folder for ParaView: threads.pvd and shapes.pvd. Threads are polylines with the fields arc, radius, curvature, twist, d1, d2, d3, and, \
+where a scene is run, tension, velocity and contact_force: a recording has no forces. Filter `Tube` with `Vary Radius By Absolute Scalar` draws \
+them with their radius.
+  obj   the last frame as one file (--out ends in .obj), or a folder with a file a frame.
+  csv   a table: time, thread, particle, position, and the material frame of the element after it as a quaternion.
+
+Frames are those that there are, at most --fps a second; the same input gives the same bytes.
+
+Examples:
+  sutura export square_knot --out knot.glb          run a scene, for a game engine
+  sutura export out/overhand/trajectory.sutura --out overhand.glb --fps 60
+                                                    what was recorded
+  sutura export overhand --format vtk --out /tmp/overhand --to 2
+                                                    the first two seconds with their forces, for ParaView
+  sutura export out/overhand/trajectory.sutura --out tied.obj --sides 24
+                                                    the knot as it ends, for a printer
+  sutura export catenary --format csv               to out/catenary/catenary.csv
+
+Exit codes: 0 written; 2 it could not be.")]
+pub struct Export {
+    /// Trajectory, scene file, or the name of a built-in scene
+    #[arg(value_name = "SCENE_OR_TRAJECTORY")]
+    pub source: String,
+    /// Kind of file [default: by the ending of --out]
+    #[arg(long, short, value_enum)]
+    pub format: Option<ExportFormat>,
+    /// File to write, or folder of a series [default: out/<scene>/...]
+    #[arg(long, short, value_name = "FILE|DIR")]
+    pub out: Option<PathBuf>,
+    /// Frames a second, at most
+    #[arg(long, value_name = "N", default_value_t = 30.0, value_parser = positive)]
+    pub fps: f64,
+    /// First time [s]
+    #[arg(long, value_name = "TIME", default_value_t = 0.0, value_parser = time)]
+    pub from: f64,
+    /// Last time [s] [default: the end]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub to: Option<f64>,
+    /// Vertices around a thread (glb, obj)
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u16).range(3..=256))]
+    pub sides: u16,
+    /// Rings of vertices an element (glb, obj)
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub rings: u16,
+    /// Value for a key of the scene instead of its own, as in `sutura run`
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting)]
+    pub settings: Vec<(String, String)>,
+    /// Draw no progress bar, print nothing
+    #[arg(long, short)]
+    pub quiet: bool,
+}
+
+/// Kind of file.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// glTF 2.0, binary
+    Glb,
+    /// VTK PolyData with fields
+    Vtk,
+    /// Wavefront OBJ
+    Obj,
+    /// Table
+    Csv,
 }
 
 fn setting(text: &str) -> Result<(String, String), String> {

@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod export;
 mod knot;
 mod knot_strength;
 mod plot;
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
         Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
         Some(Command::Validate(a)) => validate::validate(&a),
         Some(Command::Replay(a)) => replay::replay(&a),
+        Some(Command::Export(a)) => export::export(&a).map(|()| true),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

@@ -1,7 +1,7 @@
 //! Curves over time as SVG, the same turned into PNG, and captions on pictures. Text is set in `DejaVu Sans`, which is part of the
 //! program, so that no font need be installed.
 
-use crate::still::{Image, Size, THREAD_COLORS};
+use crate::still::{Image, Size};
 use anyhow::Context as _;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
@@ -9,6 +9,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::path::Path;
 use std::sync::Once;
+use sutura_scene::export::THREAD_COLORS;
 
 /// One picture of curves.
 #[derive(Default)]

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{Geometry, Pose};
-use sutura_scene::{Frame, Header, KnotReport, Outcome, Report, Runner, Scene, Series, ShapeOutline};
+use sutura_scene::{Frame, Header, KnotReport, Outcome, Report, Runner, Scene, Series};
 
 impl Run {
     /// A built-in scene with everything left at its default.
@@ -212,22 +212,9 @@ fn subject(header: &Header, frame: &Frame) -> Subject {
     let tubes = header.threads.iter().zip(&frame.positions).map(|(t, x)| Tube { points: x.iter().map(point).collect(), radius: t.radius }).collect();
     let solids = header.shapes.iter().zip(&frame.shapes).map(|(shape, (x, q))| {
         let orientation = DQuat::from_array(q.map(f64::from)).normalize();
-        Solid { geometry: geometry(&shape.outline), pose: Pose::new(point(x), orientation) }
+        Solid { geometry: Geometry::from(&shape.outline), pose: Pose::new(point(x), orientation) }
     });
     Subject { tubes, solids: solids.collect() }
-}
-
-fn geometry(outline: &ShapeOutline) -> Geometry {
-    match outline {
-        ShapeOutline::Plane => Geometry::Plane,
-        ShapeOutline::Sphere { radius } => Geometry::Sphere { radius: *radius },
-        ShapeOutline::Capsule { radius, half_length } => Geometry::Capsule { radius: *radius, half_length: *half_length },
-        ShapeOutline::Cylinder { radius, half_length } => Geometry::Cylinder { radius: *radius, half_length: *half_length },
-        ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from(*half_sides) },
-        ShapeOutline::Mesh { vertices, triangles } => {
-            Geometry::Mesh { vertices: vertices.iter().map(|v| DVec3::from(*v)).collect(), triangles: triangles.clone() }
-        }
-    }
 }
 
 /// Two pictures at each time: all of the threads, and the knot from near.

@@ -72,10 +72,6 @@ impl Image {
     }
 }
 
-/// Thread colors by slot, chosen to be told apart also by the color-blind (after Okabe and Ito 2008, darkened a little).
-pub const THREAD_COLORS: [[u8; 3]; 10] =
-    [[38, 84, 160], [222, 128, 20], [0, 140, 105], [190, 70, 130], [110, 80, 170], [150, 110, 60], [70, 70, 75], [120, 165, 30], [0, 155, 190], [205, 60, 50]];
-
 /// Cells of the 4 x 4 grid of a pixel in the order in which they are sampled: first four that share no row and no column.
 const SAMPLE_ORDER: [u32; 16] = [1, 7, 8, 14, 2, 4, 11, 13, 0, 6, 9, 15, 3, 5, 10, 12];
 

@@ -6,14 +6,14 @@ use crate::report::{
 };
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
-use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, Trajectory};
+use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, ThreadLook, Trajectory};
 use crate::watch::{Check, Probe, profile};
 use cpu_time::ThreadTime;
 use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{Geometry, Grip, Handle, IncidentKind, Rod, RodView, World};
+use sutura::{Grip, Handle, IncidentKind, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -444,27 +444,35 @@ impl Runner {
         self.progress()
     }
 
+    /// The threads in the order of the scene.
+    pub fn rods(&self) -> impl Iterator<Item = RodView<'_>> {
+        self.stage.rods()
+    }
+    /// Where the shapes are, in the order of the scene.
+    pub fn shape_poses(&self) -> impl Iterator<Item = Pose> {
+        (0..self.scene.shapes.len()).map(|i| self.stage.shape_pose(i))
+    }
+
+    /// Simulated time since the scene began \[s\].
+    pub fn time(&self) -> f64 {
+        self.stage.time
+    }
+
     // ---- recording ----
 
     /// What the recording holds (for drawing while it runs).
     pub fn header(&self) -> Header {
-        let outline = |g: &Geometry| match g {
-            Geometry::Plane => ShapeOutline::Plane,
-            Geometry::Sphere { radius } => ShapeOutline::Sphere { radius: *radius },
-            Geometry::Capsule { radius, half_length } => ShapeOutline::Capsule { radius: *radius, half_length: *half_length },
-            Geometry::Cylinder { radius, half_length } => ShapeOutline::Cylinder { radius: *radius, half_length: *half_length },
-            Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
-            Geometry::Mesh { vertices, triangles } => {
-                ShapeOutline::Mesh { vertices: vertices.iter().map(DVec3::to_array).collect(), triangles: triangles.clone() }
-            }
+        let thread = |(t, r): (&crate::scene::ThreadDef, RodView<'_>)| {
+            let (lengths, section, size) = (r.rest_lengths().to_vec(), r.cross_section().into(), r.size().0.clone());
+            let look = Some(ThreadLook { lengths, section, size, seam: r.seam_turn() });
+            Thread { name: t.name.clone(), radius: t.spec.radius, elements: r.n_elements(), look }
         };
-        let thread = |(t, r): (&crate::scene::ThreadDef, RodView<'_>)| Thread { name: t.name.clone(), radius: t.spec.radius, elements: r.n_elements() };
         Header {
             scene: self.scene.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             frame_rate: self.scene.frame_rate,
             threads: self.scene.threads.iter().zip(self.stage.rods()).map(thread).collect(),
-            shapes: self.scene.shapes.iter().map(|s| Shape { name: s.name.clone(), outline: outline(&s.spec.geometry) }).collect(),
+            shapes: self.scene.shapes.iter().map(|s| Shape { name: s.name.clone(), outline: ShapeOutline::from(&s.spec.geometry) }).collect(),
             grips: self.scene.grips.clone(),
         }
     }

@@ -1,6 +1,8 @@
 //! Recordings: positions and frames over time, in a small binary file that reads back.
 
 use std::path::Path;
+use sutura::glam::DVec3;
+use sutura::{Geometry, Section};
 
 /// A recording of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,6 +39,34 @@ pub struct Thread {
     pub radius: f64,
     /// Elements n; a frame has n + 1 positions and n orientations.
     pub elements: usize,
+    /// What it looks like; recordings of earlier versions have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub look: Option<ThreadLook>,
+}
+
+/// What a thread looks like when nothing bends it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ThreadLook {
+    /// Rest lengths of its elements \[m\].
+    pub lengths: Vec<f64>,
+    /// Its cross-section, axes along d1 and d2.
+    pub section: SectionOutline,
+    /// Factor on the size of the section: rest arc length \[m\] and factor, linear between.
+    pub size: Vec<(f64, f64)>,
+    /// Of a closed thread, the turn about d3 at rest from its last frame to its first \[rad\].
+    pub seam: Option<f64>,
+}
+
+/// Shape of a cross-section (see `sutura::Section`).
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SectionOutline {
+    /// Round, of the thread's radius.
+    Round,
+    /// An ellipse with these semi-axes \[m\].
+    Ellipse([f64; 2]),
+    /// A rectangle with these sides \[m\].
+    Rectangle([f64; 2]),
 }
 
 /// A recorded shape.
@@ -85,6 +115,56 @@ pub enum ShapeOutline {
         /// Corners of each triangle.
         triangles: Vec<[u32; 3]>,
     },
+}
+
+impl From<Section> for SectionOutline {
+    fn from(s: Section) -> Self {
+        match s {
+            Section::Round => SectionOutline::Round,
+            Section::Ellipse(axes) => SectionOutline::Ellipse(axes),
+            Section::Rectangle(sides) => SectionOutline::Rectangle(sides),
+        }
+    }
+}
+
+impl From<SectionOutline> for Section {
+    fn from(s: SectionOutline) -> Self {
+        match s {
+            SectionOutline::Round => Section::Round,
+            SectionOutline::Ellipse(axes) => Section::Ellipse(axes),
+            SectionOutline::Rectangle(sides) => Section::Rectangle(sides),
+        }
+    }
+}
+
+impl From<&Geometry> for ShapeOutline {
+    fn from(geometry: &Geometry) -> Self {
+        match geometry {
+            Geometry::Plane => ShapeOutline::Plane,
+            Geometry::Sphere { radius } => ShapeOutline::Sphere { radius: *radius },
+            Geometry::Capsule { radius, half_length } => ShapeOutline::Capsule { radius: *radius, half_length: *half_length },
+            Geometry::Cylinder { radius, half_length } => ShapeOutline::Cylinder { radius: *radius, half_length: *half_length },
+            Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
+            Geometry::Mesh { vertices, triangles } => {
+                ShapeOutline::Mesh { vertices: vertices.iter().map(DVec3::to_array).collect(), triangles: triangles.clone() }
+            }
+        }
+    }
+}
+
+impl From<&ShapeOutline> for Geometry {
+    fn from(outline: &ShapeOutline) -> Self {
+        match outline {
+            ShapeOutline::Plane => Geometry::Plane,
+            ShapeOutline::Sphere { radius } => Geometry::Sphere { radius: *radius },
+            ShapeOutline::Capsule { radius, half_length } => Geometry::Capsule { radius: *radius, half_length: *half_length },
+            ShapeOutline::Cylinder { radius, half_length } => Geometry::Cylinder { radius: *radius, half_length: *half_length },
+            ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from(*half_sides) },
+            ShapeOutline::Mesh { vertices, triangles } => {
+                Geometry::Mesh { vertices: vertices.iter().map(|v| DVec3::from(*v)).collect(), triangles: triangles.clone() }
+            }
+        }
+    }
 }
 
 /// One recorded frame.
@@ -232,20 +312,24 @@ impl Frame {
     /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts of the thread's elements.
     pub(crate) fn fit(&mut self, header: &Header) {
         for (thread, (x, q)) in header.threads.iter().zip(self.positions.iter_mut().zip(&mut self.orientations)) {
-            let (n, had) = (thread.elements, q.len());
-            if n == had || n == 0 || had == 0 {
-                continue;
-            }
-            let at = |k: usize| {
-                let s = k as f64 * had as f64 / n as f64;
-                let e = (s as usize).min(had - 1);
-                let u = (s - e as f64) as f32;
-                std::array::from_fn(|c| x[e][c] + (x[e + 1][c] - x[e][c]) * u)
-            };
-            *x = (0..=n).map(at).collect();
-            *q = (0..n).map(|k| q[(((k as f64 + 0.5) * had as f64 / n as f64) as usize).min(had - 1)]).collect();
+            refit(thread.elements, x, q, |a, b, u| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * u as f32));
         }
     }
+}
+
+/// A thread of `n` elements where another one lies: points at equal parts of its elements, the frame of the element in which the new one has its middle.
+pub(crate) fn refit<P: Copy, Q: Copy>(n: usize, x: &mut Vec<P>, q: &mut Vec<Q>, lerp: impl Fn(P, P, f64) -> P) {
+    let had = q.len();
+    if n == had || n == 0 || had == 0 {
+        return;
+    }
+    let at = |k: usize| {
+        let s = k as f64 * had as f64 / n as f64;
+        let e = (s as usize).min(had - 1);
+        lerp(x[e], x[e + 1], s - e as f64)
+    };
+    *x = (0..=n).map(at).collect();
+    *q = (0..n).map(|k| q[(((k as f64 + 0.5) * had as f64 / n as f64) as usize).min(had - 1)]).collect();
 }
 
 struct Reader<'a> {
@@ -297,11 +381,12 @@ mod tests {
     use super::*;
 
     fn sample() -> Trajectory {
+        let look = ThreadLook { lengths: vec![0.1, 0.3], section: SectionOutline::Ellipse([1e-4, 2e-4]), size: vec![(0.0, 1.0)], seam: None };
         let header = Header {
             scene: "s".into(),
             version: "1".into(),
             frame_rate: 60.0,
-            threads: vec![Thread { name: "a".into(), radius: 1e-4, elements: 2 }],
+            threads: vec![Thread { name: "a".into(), radius: 1e-4, elements: 2, look: Some(look) }],
             shapes: vec![Shape { name: "post".into(), outline: ShapeOutline::Cylinder { radius: 0.005, half_length: 0.01 } }],
             grips: vec!["left".into(), "right".into()],
         };

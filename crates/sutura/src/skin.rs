@@ -8,7 +8,7 @@
 //! plane of the bend shrinks by 1 - cos(a / 2) at most, that across not at all.
 
 use crate::error::{Error, check};
-use crate::math::exp;
+use crate::math::{Pose, exp};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::Geometry;
 use crate::view::RodView;
@@ -27,6 +27,15 @@ pub struct TriangleMesh {
     pub uvs: Vec<[f32; 2]>,
     /// Corners of each triangle.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// The mesh of a body where it is placed.
+    pub fn placed(&self, pose: &Pose) -> Self {
+        let turn = |n: &[f32; 3]| (pose.orientation * Vec3::from(*n).as_dvec3()).as_vec3().to_array();
+        let place = |x: &[f32; 3]| pose.transform_point(Vec3::from(*x).as_dvec3()).as_vec3().to_array();
+        TriangleMesh { positions: self.positions.iter().map(place).collect(), normals: self.normals.iter().map(turn).collect(), ..self.clone() }
+    }
 }
 
 /// How the vertices of a skin follow bones.

@@ -2,10 +2,11 @@
 
 use super::camera::Camera;
 use super::cast::{Capsule, Primitive, Ray, Tree};
-use super::{Color, Subject, THREAD_COLORS};
+use super::{Color, Subject};
 use core::f64::consts::TAU;
 use sutura::Geometry;
 use sutura::glam::DVec3;
+use sutura_scene::export::THREAD_COLORS;
 
 const SOLID_COLOR: [u8; 3] = [206, 202, 194];
 

@@ -1,0 +1,80 @@
+//! Wavefront OBJ: an object a thread and shape, with texture coordinates and normals.
+
+use super::{ExportError, Looks, Moment, Output};
+use crate::trajectory::Header;
+use std::fmt::Write as _;
+use sutura::skin::{Bone, TriangleMesh};
+
+/// The looks, and the last text where there is to be one file.
+pub struct Obj {
+    looks: Looks,
+    names: Vec<String>,
+    last: Option<String>,
+    number: usize,
+}
+
+impl Obj {
+    pub fn new(looks: Looks, header: &Header) -> Self {
+        let names = header.threads.iter().map(|t| &t.name).chain(header.shapes.iter().map(|s| &s.name));
+        // A name ends at a blank.
+        let names = names.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_")).collect();
+        Obj { looks, names, last: None, number: 0 }
+    }
+
+    pub fn add(&mut self, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
+        let text = self.text(moment);
+        if out.is_one_file() {
+            self.last = Some(text);
+            return Ok(());
+        }
+        let name = format!("frame_{:05}.obj", self.number);
+        self.number += 1;
+        out.write(Some(&name), text.as_bytes())
+    }
+
+    fn text(&self, moment: &Moment) -> String {
+        let mut text = format!("# Sutura {}, meters, {} s\n", env!("CARGO_PKG_VERSION"), moment.time);
+        let (mut vertices, mut textures) = (1, 1);
+        let mut names = self.names.iter();
+        let mut put = |mesh: &TriangleMesh, positions: &[[f32; 3]], normals: &[[f32; 3]]| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "o {}", names.next().map_or("thing", String::as_str));
+            for [x, y, z] in positions {
+                let _ = writeln!(text, "v {x} {y} {z}");
+            }
+            for [u, v] in &mesh.uvs {
+                let _ = writeln!(text, "vt {u} {v}");
+            }
+            for [x, y, z] in normals {
+                let _ = writeln!(text, "vn {x} {y} {z}");
+            }
+            for t in &mesh.triangles {
+                let _ = write!(text, "f");
+                for i in t {
+                    let i = *i as usize;
+                    let texture = if mesh.uvs.is_empty() { String::new() } else { (textures + i).to_string() };
+                    let _ = write!(text, " {}/{texture}/{}", vertices + i, vertices + i);
+                }
+                text.push('\n');
+            }
+            vertices += positions.len();
+            textures += mesh.uvs.len();
+        };
+        for (skin, strand) in self.looks.skins.iter().zip(&moment.threads) {
+            let mut bones = vec![Bone::default(); skin.n_bones()];
+            skin.bones_at(&strand.positions, &strand.orientations, &mut bones);
+            let (mut positions, mut normals) = (vec![[0.0; 3]; skin.n_vertices()], vec![[0.0; 3]; skin.n_vertices()]);
+            skin.pose(&bones, &mut positions, &mut normals);
+            put(skin.mesh(), &positions, &normals);
+        }
+        for (mesh, pose) in self.looks.shapes.iter().zip(&moment.shapes) {
+            let placed = mesh.placed(pose);
+            put(&placed, &placed.positions, &placed.normals);
+        }
+        text
+    }
+
+    pub fn finish(self, out: &mut Output) -> Result<(), ExportError> {
+        self.last.map_or(Ok(()), |text| out.write(None, text.as_bytes()))
+    }
+}

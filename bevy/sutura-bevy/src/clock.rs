@@ -17,6 +17,11 @@ pub enum PhysicsSet {
     Step,
 }
 
+/// All frames of physics of a drawn frame, and what is drawn of them, in `RunFixedMainLoop`. What runs after it in that schedule sees the new state before
+/// `Update`.
+#[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
+pub struct PhysicsLoop;
+
 /// How physics follows real time.
 #[derive(Resource, Debug, Clone)]
 pub struct PhysicsClock {

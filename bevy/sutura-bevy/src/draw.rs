@@ -1,6 +1,6 @@
 //! Pictures of threads and bodies: meshes, skins, materials.
 
-use crate::clock::{PhysicsClock, advance};
+use crate::clock::{PhysicsClock, PhysicsLoop, advance};
 use crate::look::{self, BodyLook, DRAPE_TILE, Materials};
 use crate::mesh::Triangles;
 use crate::space::Space;
@@ -85,7 +85,7 @@ pub struct Live(pub bool);
 pub(crate) fn build(app: &mut App) {
     // They follow the world whether or not there is a renderer.
     app.insert_resource(Live(true));
-    app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).run_if(|live: Res<Live>| live.0));
+    app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0));
     let renders = resource_exists::<Assets<StandardMaterial>>;
     app.add_systems(Startup, make_materials.run_if(renders));
     app.add_systems(PostUpdate, (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids).chain().before(TransformSystems::Propagate).run_if(renders));

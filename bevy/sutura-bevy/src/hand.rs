@@ -78,6 +78,13 @@ impl Default for Hand {
     }
 }
 
+impl Hand {
+    /// Holds nothing any more, as where what it held is gone. It takes again when the button goes down anew.
+    pub fn let_go(&mut self) {
+        (self.held, self.force, self.was_pressed) = (None, DVec3::ZERO, true);
+    }
+}
+
 /// Reads the mouse.
 pub(crate) fn read_pointer(
     mut pointer: ResMut<Pointer>,

@@ -40,7 +40,7 @@ mod things;
 mod tube;
 mod world;
 
-pub use clock::{PhysicsClock, PhysicsFrame, PhysicsSet};
+pub use clock::{PhysicsClock, PhysicsFrame, PhysicsLoop, PhysicsSet};
 pub use draw::{Drawn, Live, Solid, Strand, heat};
 pub use hand::{Hand, Held, Pointer, PointerCamera};
 pub use mesh::Triangles;
@@ -67,7 +67,7 @@ impl Plugin for SuturaPlugin {
         app.configure_sets(PhysicsFrame, (PhysicsSet::Drive, PhysicsSet::Step).chain());
         // What was spawned is there, and the pointer is where the mouse is, before physics of the same drawn frame begins.
         app.add_systems(PreUpdate, (things::take_up, hand::read_pointer, hand::grab, things::take_up).chain().after(InputSystems));
-        app.add_systems(RunFixedMainLoop, clock::advance);
+        app.add_systems(RunFixedMainLoop, clock::advance.in_set(PhysicsLoop));
         app.add_systems(PhysicsFrame, (things::take_up.before(PhysicsSet::Drive), things::step.in_set(PhysicsSet::Step)));
         app.add_observer(things::thread_gone).add_observer(things::body_gone).add_observer(things::grip_gone);
         draw::build(app);

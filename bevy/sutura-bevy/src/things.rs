@@ -3,7 +3,7 @@
 use crate::clock::PhysicsClock;
 use crate::world::Sutura;
 use bevy::prelude::*;
-use sutura::glam::{DQuat, DVec3};
+use sutura::glam::DQuat;
 use sutura::{GripSpec, Handle, Hold, Place, Pose, Rod, RodSpec, Shape, ShapeMotion, ShapeSpec, Wrench};
 
 /// A thread. It is in the world from the next frame on, and as long as its entity lives.
@@ -318,6 +318,7 @@ pub(crate) fn grip_gone(gone: On<Remove, Grip>, grips: Query<&Grip>, mut sutura:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sutura::glam::DVec3;
 
     #[test]
     fn a_grip_keeps_its_speed_and_pulls_no_harder_than_it_may() {

@@ -65,16 +65,19 @@ impl Source {
 /// The skin of a thread of a recording, whose first positions are these \[m\].
 pub fn skin(thread: &Thread, positions: &[[f32; 3]]) -> SkinSpec {
     let place = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
-    // Recordings of earlier versions have no rest lengths.
+    // Recordings of earlier versions have no rest lengths; a thread whose ends meet is taken for a closed one.
     let lengths = || positions.windows(2).map(|w| place(w[0]).distance(place(w[1])).max(1e-9)).collect();
     match &thread.look {
         Some(look) => SkinSpec {
             section: look.section.into(),
-            size: Profile::new(look.size.clone()),
+            size: Profile(look.size.clone()),
             seam: look.seam,
             ..SkinSpec::new(look.lengths.clone(), thread.radius)
         },
-        None => SkinSpec::new(lengths(), thread.radius),
+        None => SkinSpec {
+            seam: (positions.len() > 3 && positions.first() == positions.last()).then_some(0.0),
+            ..SkinSpec::new(lengths(), thread.radius)
+        },
     }
 }
 

@@ -6,7 +6,6 @@ use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
 use bevy::prelude::*;
 use sutura_bevy::look::{BodyLook, ThreadLook};
 use sutura_bevy::sutura::glam::{DQuat, DVec3};
-use sutura_bevy::sutura::skin::SkinSpec;
 use sutura_bevy::sutura::{Geometry, Pose};
 use sutura_bevy::{Body, Hand, Live, PhysicsClock, Solid, Space, Strand, Sutura, Thread, Triangles};
 use sutura_scene::{Camera, Frame, Header, Runner, Trajectory};
@@ -127,9 +126,7 @@ fn clear(world: &mut World, name: &str) {
     let generation = world.resource::<Stage>().generation + 1;
     world.insert_resource(Stage { name: name.into(), generation, ..Stage::default() });
     world.insert_resource(Sutura::default());
-    let hand = world.resource::<Hand>();
-    let kept = Hand { speed_limit: hand.speed_limit, force_limit: hand.force_limit, hold: hand.hold, ..Hand::default() };
-    world.insert_resource(kept);
+    world.resource_mut::<Hand>().let_go();
     world.insert_resource(Live(true));
     world.resource_mut::<PhysicsClock>().restart();
 }

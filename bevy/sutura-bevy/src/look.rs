@@ -47,7 +47,7 @@ pub enum BodyLook {
 }
 
 /// Side of a tile of drape \[m\].
-pub const DRAPE_TILE: f32 = 0.08;
+pub const DRAPE_TILE: f32 = 0.07;
 
 /// The materials of bodies, made once.
 #[derive(Resource, Debug, Clone)]
@@ -127,7 +127,7 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
 /// Color and normals of a tile of drape: a weave, with soft folds.
 fn drape() -> (Image, Image) {
     const SIZE: usize = 1024;
-    const YARNS: f32 = 128.0;
+    const YARNS: f32 = 160.0;
     let folds = |u: f32, v: f32| {
         let wave = |a: f32, b: f32, shift: f32| (TAU * (a * u + b * v) + shift + 0.9 * (TAU * (b * u - a * v)).sin()).sin();
         0.45 * wave(1.0, 2.0, 0.3) + 0.3 * wave(3.0, -1.0, 1.1) + 0.16 * wave(2.0, 5.0, 2.7) + 0.09 * wave(7.0, 3.0, 0.9)
@@ -139,11 +139,11 @@ fn drape() -> (Image, Image) {
         let (across, along) = if over { (y.rem_euclid(1.0), x.rem_euclid(1.0)) } else { (x.rem_euclid(1.0), y.rem_euclid(1.0)) };
         (PI * across).sin() * (0.7 + 0.3 * (PI * along).sin())
     };
-    let height = |u: f32, v: f32| 0.012 * folds(u, v) + 0.0011 * weave(u, v);
-    let base = Srgba::rgb(0.105, 0.40, 0.285);
+    let height = |u: f32, v: f32| 0.014 * folds(u, v) + 0.0004 * weave(u, v);
+    let base = Srgba::rgb(0.16, 0.42, 0.36);
     let color = picture(SIZE, |u, v| {
         let mottle = 1.0 + 0.05 * folds(v, u);
-        scaled(base, mottle * (0.72 + 0.28 * weave(u, v)))
+        scaled(base, mottle * (0.87 + 0.13 * weave(u, v)))
     });
     (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 1.0, height), TextureFormat::Rgba8Unorm))
 }
@@ -161,6 +161,12 @@ pub fn surroundings() -> (Image, Image) {
             // A blurred lamp is wider and fainter.
             let (inner, outer) = (edge + 0.02, edge - 0.03 - 1.2 * blur);
             sum += Vec3::new(1.0, 0.97, 0.92) * bright * smooth(outer, inner, c) / (1.0 + 9.0 * blur);
+        }
+        // Long lamps by the walls, which metal shows as streaks.
+        for (x, z) in [(0.8, 0.6), (-0.95, 0.3), (0.2, -0.98)] {
+            let side = Vec2::new(d.x, d.z).try_normalize().map_or(0.0, |s| s.dot(Vec2::new(x, z)));
+            let level = smooth(-0.25 - blur, 0.1, d.y) * smooth(0.95 + blur, 0.6, d.y);
+            sum += Vec3::new(0.95, 0.98, 1.0) * (0.5 * level * smooth(0.93 - 0.9 * blur, 0.985, side) / (1.0 + 5.0 * blur));
         }
         sum
     };

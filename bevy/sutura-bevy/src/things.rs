@@ -4,7 +4,7 @@ use crate::clock::PhysicsClock;
 use crate::world::Sutura;
 use bevy::prelude::*;
 use sutura::glam::DQuat;
-use sutura::{GripSpec, Handle, Hold, Place, Pose, Rod, RodSpec, Shape, ShapeMotion, ShapeSpec, Wrench};
+use sutura::{Drive, GripSpec, Handle, Hold, Place, Pose, Rod, RodSpec, Shape, ShapeMotion, ShapeSpec, Wrench};
 
 /// A thread. It is in the world from the next frame on, and as long as its entity lives.
 #[derive(Component, Debug)]
@@ -115,17 +115,22 @@ pub struct Grip {
     place: Place,
     hold: Hold,
     /// Where it is to be \[m\]: it is there at the end of the frames of physics of the same drawn frame, unless a limit is reached. `None` lets it
-    /// hold where it took.
+    /// hold where it is.
     pub target: Option<Pose>,
     /// Fastest that it moves \[m/s\].
     pub speed_limit: f64,
-    /// Force \[N\] from which on it does not pull any harder.
+    /// Whether it gives way, as a hand does: it goes to its target with no more than `force_limit`, slower by the part of that which it meets, and does
+    /// not turn. One that does not is a machine: it moves and turns whatever the force, and a thread that cannot follow gets stuck.
+    pub yields: bool,
+    /// Greatest force of one that yields \[N\].
     pub force_limit: f64,
     handle: Option<Handle<sutura::Grip>>,
     own: bool,
     error: Option<sutura::Error>,
-    /// The pose given last.
+    /// The pose now; of one that does not yield the one given last.
     pose: Pose,
+    /// Whether a force drives it.
+    pushing: bool,
     wrench: Wrench,
 }
 
@@ -138,11 +143,13 @@ impl Grip {
             hold,
             target: None,
             speed_limit: 1.0,
+            yields: true,
             force_limit: 5.0,
             handle: None,
             own: true,
             error: None,
             pose: Pose::IDENTITY,
+            pushing: false,
             wrench: Wrench::default(),
         }
     }
@@ -166,7 +173,7 @@ impl Grip {
     pub fn thread(&self) -> Entity {
         self.thread
     }
-    /// Where it was put last \[m\].
+    /// Where it is \[m\].
     pub fn pose(&self) -> Pose {
         self.pose
     }
@@ -183,16 +190,22 @@ impl Grip {
     fn next(&self, dt: f64, frames: u32) -> Pose {
         let Some(target) = self.target else { return self.pose };
         let part = 1.0 / f64::from(frames.max(1));
-        let mut step = (target.position - self.pose.position) * part;
-        if self.force() > self.force_limit {
-            // What pulls harder is left out; sideways and back it may go.
-            let along = self.wrench.force / self.force();
-            step -= along * step.dot(along).max(0.0);
-        }
-        let step = step.clamp_length_max(self.speed_limit * dt);
+        let step = ((target.position - self.pose.position) * part).clamp_length_max(self.speed_limit * dt);
         Pose::new(self.pose.position + step, toward(self.pose.orientation, target.orientation, part))
     }
+
+    /// How one that yields gets there: by a force along the way, at a speed that brings it there where nothing resists.
+    fn drive(&self, dt: f64, frames: u32) -> Drive {
+        let way = self.next(dt, frames).position - self.pose.position;
+        match way.try_normalize().filter(|_| way.length() > CLOSE) {
+            Some(direction) => Drive::Force { direction, force: self.force_limit, speed_limit: way.length() / dt },
+            None => Drive::Pose,
+        }
+    }
 }
+
+/// A target this close is reached \[m\]: a thousandth of the thinnest thread.
+const CLOSE: f64 = 1e-7;
 
 /// Part of the way from one orientation to another, the short way.
 fn toward(from: DQuat, to: DQuat, part: f64) -> DQuat {
@@ -240,10 +253,18 @@ pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bod
     let dt = clock.frame;
     let mut held: Vec<(Handle<sutura::Grip>, Pose, Pose)> = Vec::new();
     for mut grip in &mut grips {
-        let (Some(handle), Some(_)) = (grip.handle, grip.target) else { continue };
-        let next = grip.next(dt, clock.remaining);
-        held.push((handle, grip.pose, next));
-        grip.pose = next;
+        let Some(handle) = grip.handle else { continue };
+        let drive = if grip.yields && grip.target.is_some() { grip.drive(dt, clock.remaining) } else { Drive::Pose };
+        // What is driven by a scene is left to it while nothing else is wanted.
+        if (grip.pushing || drive != Drive::Pose) && sutura.edit().set_grip_drive(handle, drive).is_err() {
+            continue;
+        }
+        grip.pushing = drive != Drive::Pose;
+        if !grip.yields && grip.target.is_some() {
+            let next = grip.next(dt, clock.remaining);
+            held.push((handle, grip.pose, next));
+            grip.pose = next;
+        }
     }
     let mut moved: Vec<(Handle<Shape>, Pose, Pose)> = Vec::new();
     for mut body in &mut bodies {
@@ -280,8 +301,12 @@ pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bod
         }
     });
     for mut grip in &mut grips {
-        if let Some(wrench) = grip.handle.and_then(|h| sutura.world().grip_wrench(h).ok()) {
+        let Some(handle) = grip.handle else { continue };
+        if let Ok(wrench) = sutura.world().grip_wrench(handle) {
             grip.wrench = wrench;
+        }
+        if let Some(pose) = sutura.world().grip_pose(handle).ok().filter(|_| grip.yields) {
+            grip.pose = pose;
         }
     }
     for mut body in &mut bodies {
@@ -321,13 +346,15 @@ mod tests {
     use sutura::glam::DVec3;
 
     #[test]
-    fn a_grip_keeps_its_speed_and_pulls_no_harder_than_it_may() {
+    fn a_grip_keeps_its_speed_and_rests_where_it_is_to_be() {
         let mut grip = Grip::new(Entity::PLACEHOLDER, Place::Start, Hold::Pin);
         grip.target = Some(Pose::at(DVec3::X));
         assert!((grip.next(0.01, 1).position - DVec3::X * 0.01).length() < 1e-15);
         assert!((grip.next(10.0, 4).position - DVec3::X * 0.25).length() < 1e-15);
-        grip.target = Some(Pose::at(DVec3::new(1.0, 1.0, 0.0)));
-        grip.wrench.force = DVec3::X * 6.0;
-        assert!((grip.next(10.0, 1).position - DVec3::Y).length() < 1e-15);
+        let Drive::Force { direction, force, speed_limit } = grip.drive(10.0, 4) else { panic!("not driven by force") };
+        assert_eq!((direction, force), (DVec3::X, grip.force_limit));
+        assert!((speed_limit - 0.025).abs() < 1e-15);
+        grip.target = Some(Pose::IDENTITY);
+        assert_eq!(grip.drive(0.01, 1), Drive::Pose);
     }
 }

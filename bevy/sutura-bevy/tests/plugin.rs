@@ -57,20 +57,21 @@ fn the_hand_takes_a_thread_pulls_and_lets_go() {
     look_at(&mut app, start, true);
     picture(&mut app, 1.0 / 60.0);
     assert!(matches!(app.world().resource::<Hand>().held, Some(Held::Thread(_))));
-    // Drawn 2 cm up over half a second: each picture's place is reached in the physics of the same picture.
+    // Drawn 2 cm up over half a second, a little slack: each picture's place is reached in the physics of the same picture.
     for k in 1..=30 {
-        let at = start + DVec3::Z * 0.02 * f64::from(k) / 30.0;
+        let turn = 0.2 * f64::from(k) / 30.0;
+        let at = DVec3::new(turn.cos(), 0.0, turn.sin()) * (0.1 - 0.0005 * (f64::from(k) / 5.0).min(1.0));
         look_at(&mut app, at, true);
         picture(&mut app, 1.0 / 60.0);
-        // The first of these may still close what taking hold over 20 ms left.
-        if k > 3 { eprintln!("{k} {:e}", (end_of(&app, thread) - at).length());
+        // The first of these may still close what taking hold over 20 ms left. A hand that yields by 5 N hardly feels the weight of a thread.
+        if k > 3 {
             let off = (end_of(&app, thread) - at).length();
-            assert!(off < 1e-4, "{off} m off the target in picture {k}");
+            assert!(off < 0.01 * 0.02 / 30.0, "{off} m off the target in picture {k}");
         }
     }
     // Pulled against the pin: 2 mm more than its length along the line from there. It hardly stretches, so the force is the limit's.
     let limit = app.world().resource::<Hand>().force_limit;
-    let straight = DVec3::new(0.1, 0.0, 0.02).normalize();
+    let straight = DVec3::new(0.2f64.cos(), 0.0, 0.2f64.sin());
     for k in 1..=60 {
         look_at(&mut app, straight * (0.102 + 0.002 * f64::from(k) / 60.0), true);
         picture(&mut app, 1.0 / 60.0);

@@ -40,6 +40,9 @@ pub struct Args {
     /// Closeness of the view: 2 shows things twice as large.
     #[arg(long, default_value_t = 1.0)]
     pub zoom: f64,
+    /// Try the window: show panels and overlays, press every key once, click here and there, and close it.
+    #[arg(long = "try", conflicts_with = "headless")]
+    pub trial: bool,
     /// Begin paused.
     #[arg(long)]
     pub paused: bool,

@@ -1,5 +1,6 @@
 //! A camera that turns about a point.
 
+use bevy::camera::Hdr;
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::light::EnvironmentMapLight;
 use bevy::pbr::{DistanceFog, FogFalloff};
@@ -10,7 +11,7 @@ use sutura_bevy::{Hand, Pointer, PointerCamera, look};
 /// Height of the field of view \[rad\]: narrow, as through a loupe, so that near things are not blown up.
 pub const FIELD: f32 = 0.42;
 /// What is seen where nothing is.
-pub const BACKGROUND: Color = Color::srgb(0.045, 0.075, 0.075);
+pub const BACKGROUND: Color = Color::srgb(0.11, 0.17, 0.17);
 
 /// Where the camera is.
 #[derive(Resource, Debug, Clone, PartialEq)]
@@ -119,7 +120,7 @@ pub struct Surroundings(EnvironmentMapLight);
 /// Makes it.
 pub fn make_surroundings(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
     let (diffuse, specular) = look::surroundings();
-    let light = EnvironmentMapLight { diffuse_map: images.add(diffuse), specular_map: images.add(specular), intensity: 1400.0, ..default() };
+    let light = EnvironmentMapLight { diffuse_map: images.add(diffuse), specular_map: images.add(specular), intensity: 1500.0, ..default() };
     commands.insert_resource(Surroundings(light));
 }
 
@@ -130,8 +131,9 @@ pub fn lens(orbit: &Orbit, around: &Surroundings) -> impl Bundle {
         Camera { clear_color: ClearColorConfig::Custom(BACKGROUND), ..default() },
         Projection::from(projection(orbit)),
         orbit.transform(),
-        // Needs no table of the engine's.
-        Tonemapping::AcesFitted,
+        // Keeps hues, and needs no table of the renderer's. Light is kept beyond white until then.
+        Tonemapping::SomewhatBoringDisplayTransform,
+        Hdr,
         Msaa::Sample4,
         around.0.clone(),
         fog(orbit),

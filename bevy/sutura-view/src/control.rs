@@ -323,6 +323,8 @@ pub fn drive(
         if way == DVec3::ZERO && twist == 0.0 {
             continue;
         }
+        // A force does not turn: what twists is moved as it is told.
+        grip.yields = twist == 0.0;
         let pose = grip.pose();
         let step = way.normalize_or_zero() * (viewer.grip_speed * fast * clock.frame * f64::from(clock.remaining.max(1)));
         let about = DQuat::from_axis_angle(pose.orientation * DVec3::Z, twist * f64::from(clock.remaining.max(1)));
@@ -334,7 +336,7 @@ pub fn drive(
 pub fn settle(viewer: Res<Viewer>, mut grips: Query<&mut Grip>) {
     for entity in viewer.grips.iter().flatten() {
         if let Ok(mut grip) = grips.get_mut(*entity) {
-            grip.target = None;
+            (grip.target, grip.yields) = (None, true);
         }
     }
 }

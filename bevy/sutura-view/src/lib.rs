@@ -9,6 +9,7 @@ mod panel;
 pub mod source;
 pub mod stage;
 mod studio;
+mod trial;
 
 pub use args::Args;
 pub use studio::{Picture, Studio};
@@ -66,6 +67,9 @@ pub fn window(args: &Args) -> AppExit {
     app.add_systems(RunFixedMainLoop, look_at_new.after(sutura_bevy::PhysicsLoop));
     app.insert_resource(Zoom(zoom));
     app.add_systems(EguiPrimaryContextPass, panel::show);
+    if args.trial {
+        trial::build(&mut app);
+    }
     app.run()
 }
 

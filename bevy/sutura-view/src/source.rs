@@ -93,7 +93,7 @@ mod tests {
         let bad = folder.path().join("bad.toml");
         std::fs::write(&bad, "[[thread]]\nlenght = \"10 cm\"\n").unwrap();
         let said = message(Source::open(bad.to_str().unwrap()));
-        assert!(said.contains("lenght") && said.contains("length"), "{said}");
+        assert!(said.contains("bad.toml:2") && said.contains("lenght: unknown key"), "{said}");
         let cut = folder.path().join("cut.sutura");
         std::fs::write(&cut, b"SUTURATR and no more").unwrap();
         assert!(message(Source::open(cut.to_str().unwrap())).contains("recording"));

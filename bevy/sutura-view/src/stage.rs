@@ -183,9 +183,18 @@ fn replay(world: &mut World, trajectory: Trajectory) {
     (stage.header, stage.frames, stage.recorded, stage.past) = (header, frames, true, Some(0));
 }
 
-/// Up is against gravity; without gravity it is as the camera has it.
+/// Up is against gravity. Without gravity the table lies where the camera looks down at it.
 fn upward(gravity: DVec3, camera: Option<&Camera>) -> DVec3 {
-    (-gravity).try_normalize().or(camera.map(|c| c.up)).unwrap_or(DVec3::Z)
+    (-gravity).try_normalize().or(camera.map(|c| (c.from * 0.8 + c.up * 0.6).normalize_or(DVec3::Z))).unwrap_or(DVec3::Z)
+}
+
+/// Least sine of the angle at which a table is looked down at: below it one would see its edge, or its underside.
+const LEAST_RISE: f64 = 0.34;
+
+/// A direction to the eye, raised to where it sees the table.
+fn raised(from: DVec3, up: DVec3) -> DVec3 {
+    let level = from - up * from.dot(up);
+    if from.dot(up) >= LEAST_RISE || level.length() < 1e-6 { from } else { level.normalize() * (1.0 - LEAST_RISE * LEAST_RISE).sqrt() + up * LEAST_RISE }
 }
 
 fn place(p: [f32; 3]) -> DVec3 {
@@ -242,7 +251,7 @@ pub fn frame_view(world: &mut World, aspect: f32, zoom: f32) -> Orbit {
     let (stage, space) = (world.resource::<Stage>(), *world.resource::<Space>());
     let up = space.direction(stage.up);
     let camera = stage.camera;
-    let from = camera.map_or(DVec3::new(0.35, -0.8, 0.45), |c| c.from);
+    let from = raised(camera.map_or(DVec3::new(0.35, -0.8, 0.45), |c| c.from).normalize_or(DVec3::Y), stage.up);
     let points: Vec<Vec3> = points.iter().map(|p| space.place(*p)).collect();
     let at = camera.and_then(|c| c.look_at).map(|p| space.place(p));
     let width = camera.and_then(|c| c.width).map(|w| w as f32 * space.scale);
@@ -254,20 +263,18 @@ pub fn frame_view(world: &mut World, aspect: f32, zoom: f32) -> Orbit {
 pub fn lay_table(
     mut commands: Commands,
     mut stage: ResMut<Stage>,
-    space: Res<Space>,
     strands: Query<&Strand>,
-    solids: Query<(&Solid, Has<Table>)>,
-    mut tables: Query<&mut Solid, (With<Table>, Without<Prop>)>,
+    solids: Query<&Solid, Without<Table>>,
+    mut tables: Query<&mut Solid, With<Table>>,
 ) {
-    let _ = space;
-    if solids.iter().any(|(s, table)| !table && matches!(s.geometry, Geometry::Plane)) {
+    if solids.iter().any(|s| matches!(s.geometry, Geometry::Plane)) {
         return;
     }
     let up = stage.up;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut seen = |h: f64| (low, high) = (low.min(h), high.max(h));
     strands.iter().flat_map(|s| &s.positions).for_each(|p| seen(p.dot(up)));
-    for (solid, _) in solids.iter().filter(|(s, table)| !table && !matches!(s.geometry, Geometry::Plane)) {
+    for solid in &solids {
         Triangles::of(&solid.geometry, 0.0).positions.iter().for_each(|p| seen(solid.pose.transform_point(*p).dot(up)));
     }
     if !low.is_finite() {

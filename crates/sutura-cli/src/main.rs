@@ -12,6 +12,7 @@ mod run;
 mod scenes;
 mod still;
 mod validate;
+mod view;
 
 use args::{Cli, Command};
 use clap::Parser as _;
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
         Some(Command::Validate(a)) => validate::validate(&a),
         Some(Command::Replay(a)) => replay::replay(&a),
         Some(Command::Export(a)) => export::export(&a).map(|()| true),
+        Some(Command::View(a)) => view::view(&a),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

@@ -3,6 +3,7 @@
 use crate::fuzz;
 use crate::program::{self, Profile};
 use crate::tally::{Tally, cargo, root};
+use crate::viewer;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -34,6 +35,7 @@ pub fn everything(tally: &mut Tally) {
     let recorded = scenes(tally, &[]);
     same_bits(tally, &recorded);
     fuzz::run(tally, None, FUZZING);
+    viewer::check(tally);
 }
 
 /// All tests, those of the documentation among them: the command in the README, which goes on after the first failure here so that the

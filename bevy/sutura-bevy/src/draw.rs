@@ -20,7 +20,7 @@ use sutura::{Geometry, Pose};
 /// Bones of one mesh: Bevy's limit, which is that of a uniform buffer.
 const MOST_BONES: usize = 256;
 /// Half the side of the square that is drawn for a plane \[m\].
-const PLANE: f64 = 0.6;
+const PLANE: f64 = 3.0;
 
 /// A thread as it is drawn. [`Thread`]s have theirs from the world; one without a `Thread` (of a recording) is drawn as it is set.
 #[derive(Component, Debug, Clone, PartialEq)]
@@ -36,6 +36,8 @@ pub struct Strand {
     pub tensions: Vec<f64>,
     /// How it looks.
     pub look: look::ThreadLook,
+    /// Factor on the width of a round thread, where its own would be less than a pixel; 1 is true.
+    pub stoutness: f64,
     /// Tensions that are shown as blue and as red \[N\]; `None` shows its own look.
     pub tension_scale: Option<(f64, f64)>,
 }
@@ -64,9 +66,16 @@ pub struct Drawn {
     skin: Skin,
     spec: SkinSpec,
     look: look::ThreadLook,
+    stoutness: f64,
     plain: Handle<StandardMaterial>,
     colored: Handle<StandardMaterial>,
     is_colored: bool,
+}
+
+impl Drawn {
+    fn fits(&self, strand: &Strand) -> bool {
+        self.spec == strand.skin && self.look == strand.look && self.stoutness == strand.stoutness
+    }
 }
 
 /// The last two states of a thread, between which it is drawn.
@@ -106,7 +115,7 @@ pub(crate) fn show_threads(
         let Some(rod) = thread.handle().and_then(|h| sutura.world().rod(h).ok()) else { continue };
         let (Some(mut strand), Some(mut states)) = (strand, states) else {
             let (positions, orientations) = (rod.positions().to_vec(), rod.orientations().to_vec());
-            let strand = Strand { skin: SkinSpec::of(&rod), positions, orientations, tensions: Vec::new(), look: thread.look, tension_scale: None };
+            let strand = Strand { skin: SkinSpec::of(&rod), positions, orientations, tensions: Vec::new(), look: thread.look, stoutness: 1.0, tension_scale: None };
             commands.entity(entity).insert((strand, States { frames: u64::MAX, ..States::default() }));
             continue;
         };
@@ -172,14 +181,14 @@ fn mesh_strands(
 ) {
     for (entity, strand, drawn) in &strands {
         if let Some(drawn) = drawn {
-            if drawn.spec == strand.skin && drawn.look == strand.look {
+            if drawn.fits(strand) {
                 continue;
             }
             for child in drawn.bones.iter().chain(&drawn.parts) {
                 commands.entity(*child).try_despawn();
             }
         }
-        let skin = match Skin::new(&strand.skin) {
+        let skin = match Skin::new(&SkinSpec { radius: strand.skin.radius * strand.stoutness, ..strand.skin.clone() }) {
             Ok(skin) => skin,
             Err(e) => {
                 error_once!("a thread is not drawn: {e}");
@@ -207,8 +216,8 @@ fn mesh_strands(
             let shown = (Mesh3d(meshes.add(skin_mesh(&skin, &part, space.scale))), MeshMaterial3d(plain.clone()), skinned, NoFrustumCulling, ChildOf(entity));
             parts.push(commands.spawn(shown).id());
         }
-        let (spec, look) = (strand.skin.clone(), strand.look);
-        commands.entity(entity).insert(Drawn { bones, parts, most, skin, spec, look, plain, colored, is_colored: false });
+        let (spec, look, stoutness) = (strand.skin.clone(), strand.look, strand.stoutness);
+        commands.entity(entity).insert(Drawn { bones, parts, most, skin, spec, look, stoutness, plain, colored, is_colored: false });
     }
 }
 

@@ -47,7 +47,7 @@ pub enum BodyLook {
 }
 
 /// Side of a tile of drape \[m\].
-pub const DRAPE_TILE: f32 = 0.07;
+pub const DRAPE_TILE: f32 = 0.12;
 
 /// The materials of bodies, made once.
 #[derive(Resource, Debug, Clone)]
@@ -71,7 +71,7 @@ impl Materials {
         let steel = materials.add(StandardMaterial {
             base_color: Color::srgb(0.80, 0.81, 0.83),
             metallic: 1.0,
-            perceptual_roughness: 0.30,
+            perceptual_roughness: 0.22,
             ..default()
         });
         Materials { steel, drape }
@@ -127,7 +127,7 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
 /// Color and normals of a tile of drape: a weave, with soft folds.
 fn drape() -> (Image, Image) {
     const SIZE: usize = 1024;
-    const YARNS: f32 = 160.0;
+    const YARNS: f32 = 256.0;
     let folds = |u: f32, v: f32| {
         let wave = |a: f32, b: f32, shift: f32| (TAU * (a * u + b * v) + shift + 0.9 * (TAU * (b * u - a * v)).sin()).sin();
         0.45 * wave(1.0, 2.0, 0.3) + 0.3 * wave(3.0, -1.0, 1.1) + 0.16 * wave(2.0, 5.0, 2.7) + 0.09 * wave(7.0, 3.0, 0.9)
@@ -139,8 +139,8 @@ fn drape() -> (Image, Image) {
         let (across, along) = if over { (y.rem_euclid(1.0), x.rem_euclid(1.0)) } else { (x.rem_euclid(1.0), y.rem_euclid(1.0)) };
         (PI * across).sin() * (0.7 + 0.3 * (PI * along).sin())
     };
-    let height = |u: f32, v: f32| 0.014 * folds(u, v) + 0.0004 * weave(u, v);
-    let base = Srgba::rgb(0.16, 0.42, 0.36);
+    let height = |u: f32, v: f32| 0.007 * folds(u, v) + 0.0003 * weave(u, v);
+    let base = Srgba::rgb(0.13, 0.36, 0.32);
     let color = picture(SIZE, |u, v| {
         let mottle = 1.0 + 0.05 * folds(v, u);
         scaled(base, mottle * (0.87 + 0.13 * weave(u, v)))

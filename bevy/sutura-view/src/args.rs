@@ -40,6 +40,9 @@ pub struct Args {
     /// Closeness of the view: 2 shows things twice as large.
     #[arg(long, default_value_t = 1.0)]
     pub zoom: f64,
+    /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.
+    #[arg(long, default_value_t = 2.5, value_name = "PIXELS")]
+    pub least_width: f32,
     /// Try the window: show panels and overlays, press every key once, click here and there, and close it.
     #[arg(long = "try", conflicts_with = "headless")]
     pub trial: bool,

@@ -107,6 +107,10 @@ impl Orbit {
     pub fn zoom(&mut self, factor: f32) {
         self.distance = (self.distance * factor).clamp(0.05, 1e4);
     }
+    /// How large a length at the target is in a picture of this height, in pixels.
+    pub fn pixels(&self, length: f32, height: u32) -> f32 {
+        length * height as f32 / (2.0 * self.distance * (0.5 * FIELD).tan())
+    }
     /// Depths between which things are drawn.
     pub fn depths(&self) -> (f32, f32) {
         (0.02 * self.distance, 30.0 * self.distance + 200.0)

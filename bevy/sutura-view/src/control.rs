@@ -30,6 +30,8 @@ pub struct Viewer {
     pub primitives: bool,
     /// Which knot it is.
     pub knot: bool,
+    /// Least width at which a thread is drawn \[pixels\]; 0 draws it as thin as it is.
+    pub least_width: f32,
     /// Panels.
     pub panels: bool,
     /// Help.
@@ -59,6 +61,7 @@ impl Default for Viewer {
             contacts: false,
             primitives: false,
             knot: true,
+            least_width: 2.5,
             panels: true,
             help: false,
             open: None,

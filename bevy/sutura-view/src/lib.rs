@@ -64,7 +64,12 @@ pub fn window(args: &Args) -> AppExit {
     app.world_mut().resource_mut::<PhysicsClock>().budget = std::time::Duration::from_millis(22);
     let (name, zoom) = (args.scene.clone(), args.zoom as f32);
     app.add_systems(PostStartup, (move |world: &mut World| control::open(world, &name), spawn_camera).chain());
+    app.world_mut().resource_mut::<Viewer>().least_width = args.least_width;
     app.add_systems(RunFixedMainLoop, look_at_new.after(sutura_bevy::PhysicsLoop));
+    app.add_systems(Last, |world: &mut World| {
+        let height = world.query::<&Window>().iter(world).next().map_or(0, Window::physical_height);
+        stage::thicken(world, height);
+    });
     app.insert_resource(Zoom(zoom));
     app.add_systems(EguiPrimaryContextPass, panel::show);
     if args.trial {

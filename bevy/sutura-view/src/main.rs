@@ -34,6 +34,7 @@ fn draw(args: &Args) -> anyhow::Result<()> {
     let mut studio = Studio::new(args.size);
     studio.open(&args.scene).map_err(anyhow::Error::msg)?;
     studio.tension(args.tension);
+    studio.least_width(args.least_width);
     let put = |studio: &mut Studio, path: &Path| -> anyhow::Result<()> {
         let picture = studio.draw().map_err(anyhow::Error::msg)?;
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {

@@ -146,6 +146,7 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
             }
         }
         ui.separator();
+        let stout = world.query::<&Strand>().iter(world).map(|s| s.stoutness).fold(1.0, f64::max);
         let mut viewer = world.resource_mut::<Viewer>();
         ui.horizontal_wrapped(|ui| {
             let v = &mut *viewer;
@@ -159,8 +160,12 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
                 ui.checkbox(flag, name);
             }
         });
+        ui.add(egui::Slider::new(&mut viewer.least_width, 0.0..=8.0).text("least width [pixels]"));
         if viewer.tension {
             ui.label(format!("blue 0 N, red {:.3} N", viewer.tension_scale.1));
+        }
+        if stout > 1.0 {
+            ui.label(format!("threads are drawn {stout:.1} times as wide as they are"));
         }
         if !viewer.message.is_empty() {
             ui.label(&viewer.message);

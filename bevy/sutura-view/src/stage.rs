@@ -164,6 +164,7 @@ fn replay(world: &mut World, trajectory: Trajectory) {
             orientations: Vec::new(),
             tensions: Vec::new(),
             look: ThreadLook::of(i),
+            stoutness: 1.0,
             tension_scale: None,
         };
         world.spawn((strand, Name::new(thread.name.clone()), Prop(i)));
@@ -243,6 +244,20 @@ pub fn points(world: &mut World) -> Vec<DVec3> {
         out.extend(Triangles::of(&solid.geometry, 0.0).positions.iter().map(|p| solid.pose.transform_point(*p)));
     }
     out
+}
+
+/// Threads that would be thinner than the least width are drawn that wide, in steps of a quarter so that they are not made anew all the time.
+pub fn thicken(world: &mut World, pixels: u32) {
+    let (orbit, least) = (world.resource::<Orbit>().clone(), world.resource::<crate::control::Viewer>().least_width);
+    let space = *world.resource::<Space>();
+    for mut strand in world.query::<&mut Strand>().iter_mut(world) {
+        let width = f64::from(orbit.pixels(2.0 * strand.skin.radius as f32 * space.scale, pixels));
+        let steps = (f64::from(least) / width.max(1e-9)).max(1.0).ln() / 1.25f64.ln();
+        let wanted = 1.25f64.powf(steps.ceil()).min(100.0);
+        if strand.stoutness != wanted {
+            strand.stoutness = wanted;
+        }
+    }
 }
 
 /// The camera as the scene wants it, for what is there now.

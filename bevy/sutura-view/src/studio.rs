@@ -131,8 +131,10 @@ impl Studio {
     /// Looks at everything as the scene wants it, or closer.
     pub fn frame(&mut self, zoom: f64) {
         let aspect = self.size.0 as f32 / self.size.1 as f32;
-        let orbit = stage::frame_view(self.app.world_mut(), aspect, zoom as f32);
-        self.app.world_mut().insert_resource(orbit);
+        let world = self.app.world_mut();
+        let orbit = stage::frame_view(world, aspect, zoom as f32);
+        world.insert_resource(orbit);
+        stage::thicken(world, self.size.1);
     }
 
     /// Shows the tension as color, blue and red at these \[N\].
@@ -146,8 +148,7 @@ impl Studio {
 
     /// Draws it.
     pub fn draw(&mut self) -> Result<Picture, String> {
-        // What was changed is laid out, drawn, and read back.
-        self.app.update();
+        // What was changed is laid out (the table, the lamp), then drawn and read back.
         self.app.update();
         let taken: Arc<Mutex<Option<Vec<u8>>>> = Arc::default();
         let slot = taken.clone();
@@ -198,10 +199,16 @@ impl Studio {
             .collect()
     }
 
-    /// Width of a thread of this radius \[m\] in the middle of the picture, in pixels.
-    pub fn pixels(&self, radius: f64) -> f32 {
+    /// Threads thinner than this are drawn this wide, in pixels.
+    pub fn least_width(&mut self, pixels: f32) {
+        self.app.world_mut().resource_mut::<crate::control::Viewer>().least_width = pixels;
+    }
+
+    /// Width at which a thread of this radius \[m\] is drawn in the middle of the picture, in pixels.
+    pub fn width(&self, radius: f64) -> f32 {
         let (orbit, space) = (self.app.world().resource::<Orbit>(), self.app.world().resource::<Space>());
-        2.0 * radius as f32 * space.scale * self.size.1 as f32 / (2.0 * orbit.distance * (0.5 * FIELD).tan())
+        let least = self.app.world().resource::<crate::control::Viewer>().least_width;
+        orbit.pixels(2.0 * radius as f32 * space.scale, self.size.1).max(1.25 * least)
     }
 
     /// The world of the app, for tests.

@@ -1,4 +1,5 @@
-//! Pictures without a display: each sample scene has its threads where they are, and nowhere else. They are left in `out/pictures` of the build folder.
+//! Pictures without a display: each sample scene has its threads where they are, and nowhere else. Pictures that are wrong are left in the
+//! build folder.
 //!
 //! These want a Vulkan driver (`scripts/viewer_setup.sh` installs one in software), and fail without.
 
@@ -81,11 +82,10 @@ fn each_sample_scene_has_its_threads_where_they_are() {
         studio.open(sample.name).unwrap();
         studio.go(0.25);
         studio.frame(1.0);
-        studio.draw().unwrap().write(&folder.join(format!("{}.png", sample.name))).unwrap();
         paint(studio.world());
         let picture = studio.draw().unwrap();
         let radius = studio.world().query::<&Strand>().iter(studio.world()).map(|s| s.skin.radius).fold(0.0, f64::max);
-        let width = studio.pixels(radius);
+        let width = studio.width(radius);
         if let Err(why) = judge(&picture, &studio.threads(), width) {
             picture.write(&folder.join(format!("{}-wrong.png", sample.name))).unwrap();
             wrong.push(format!("{}: {why}", sample.name));
@@ -118,7 +118,7 @@ fn a_recording_is_drawn_like_the_run_that_it_is_of() {
         studio.frame(1.0);
         paint(studio.world());
         let picture = studio.draw().unwrap();
-        let width = studio.pixels(0.0);
+        let width = studio.width(0.0);
         judge(&picture, &studio.threads(), width).unwrap();
         threads.push(studio.threads());
     }

@@ -49,6 +49,28 @@ pub enum Command {
     Replay(Replay),
     /// Write a scene or a recording as glTF (GLB), VTK, OBJ or CSV, for other programs
     Export(Export),
+    /// Show a scene or a recording in a window, and take hold of it with the mouse
+    View(View),
+}
+
+/// Show a scene or a recording in a window, and take hold of it with the mouse.
+#[derive(Args, Debug)]
+#[command(after_help = "\
+This starts `sutura-view`, a program of its own that is built apart (docs/viewer.md); where it is not found, how to get it is said.
+
+Examples:
+  sutura view square_knot                             a built-in scene, by name
+  sutura view out/square_knot/trajectory.sutura       a recorded run
+  sutura view capstan --headless --screenshot c.png   what follows the scene goes to the viewer: `sutura-view --help`
+
+Exit codes: 0 the window was closed; 1 the viewer ended with an error; 2 there is no viewer.")]
+pub struct View {
+    /// Scene file, trajectory, or the name of a built-in scene [default: square_knot]
+    #[arg(value_name = "SCENE_OR_TRAJECTORY")]
+    pub scene: Option<String>,
+    /// Arguments for the viewer
+    #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
+    pub rest: Vec<String>,
 }
 
 /// Run a scene: simulate, measure, check, plot and draw it.

@@ -14,6 +14,7 @@ mod run;
 mod scenes;
 mod still;
 mod validate;
+mod view;
 
 use args::{Cli, Command};
 use clap::Parser as _;
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Some(Command::Paper(a)) => paper::paper(&a),
         Some(Command::Replay(a)) => replay::replay(&a),
         Some(Command::Export(a)) => export::export(&a).map(|()| true),
+        Some(Command::View(a)) => view::view(&a),
     };
     ExitCode::from(match done {
         Ok(true) => HOLDS,

@@ -383,3 +383,25 @@ fn a_recorded_run_replays_to_the_same_state_after_every_step() {
     assert_eq!(said(&[&one]).0, Some(2));
     assert_eq!(said(&["swing.toml"]).0, Some(2));
 }
+
+#[test]
+fn without_a_viewer_it_says_how_to_get_one_and_with_one_it_passes_on_what_was_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    // The program alone in a folder, and nothing in PATH.
+    let program = folder.path().join(format!("sutura{}", std::env::consts::EXE_SUFFIX));
+    std::fs::copy(env!("CARGO_BIN_EXE_sutura"), &program).unwrap();
+    let run = |args: &[&str]| Command::new(&program).args(args).env("PATH", folder.path().join("empty")).output().unwrap();
+    let out = run(&["view", "capstan"]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("cargo install --path bevy/sutura-view"));
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let viewer = folder.path().join("sutura-view");
+        std::fs::write(&viewer, "#!/bin/sh\necho \"$@\"\nexit 3\n").unwrap();
+        std::fs::set_permissions(&viewer, std::fs::Permissions::from_mode(0o755)).unwrap();
+        let out = run(&["view", "capstan", "--headless", "--at", "1"]);
+        assert_eq!(text(&out.stdout), "capstan --headless --at 1\n");
+        assert_eq!(out.status.code(), Some(1));
+    }
+}

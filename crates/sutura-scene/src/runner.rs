@@ -2,7 +2,7 @@
 
 use crate::error::SceneError;
 use crate::report::{
-    Clearance, FrameTimes, IncidentReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
+    Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
 };
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
@@ -12,7 +12,8 @@ use cpu_time::ThreadTime;
 use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{IncidentKind, Pose, RodView, World};
+use sutura::input::{Recorder, Recording};
+use sutura::{Grip, Handle, IncidentKind, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -135,8 +136,14 @@ impl Runner {
 
     /// Simulates one frame. Does nothing once the run is finished.
     pub fn step_frame(&mut self) -> Progress {
+        self.step_frame_with(&mut |_, _| {})
+    }
+
+    /// The same with a hand from outside: before each piece of the frame `drive` gets the world and the part of the frame that will be done with
+    /// that piece. What it does is recorded like everything else; where the scene moves the same thing, the scene does.
+    pub fn step_frame_with(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Progress {
         if !self.finished {
-            let (report, cpu, stuck) = self.simulate();
+            let (report, cpu, stuck) = self.simulate(drive);
             self.frame += 1;
             self.stage.time = self.frame as f64 / self.scene.frame_rate;
             self.stage.moment_passed();
@@ -166,7 +173,7 @@ impl Runner {
     }
 
     /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.
-    fn simulate(&mut self) -> (FrameReport, f64, bool) {
+    fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> (FrameReport, f64, bool) {
         let dt = 1.0 / self.scene.frame_rate;
         let begin = self.frame as f64 * dt;
         // What moves is sampled at every substep, so that its path does not depend on the frame rate.
@@ -176,6 +183,7 @@ impl Runner {
         let (mut cpu, mut stuck) = (Duration::ZERO, false);
         for k in 1..=pieces {
             let at = begin + dt * f64::from(k) / f64::from(pieces);
+            drive(&mut self.stage.world, f64::from(k) / f64::from(pieces));
             if let Err(e) = self.stage.drive(at) {
                 self.incident(None, e.to_string());
             }
@@ -402,6 +410,38 @@ impl Runner {
     /// The world as it is now.
     pub fn world(&self) -> &World {
         &self.stage.world
+    }
+    /// The world, for what is done to it from outside the scene between frames.
+    pub fn edit(&mut self) -> &mut Recorder {
+        &mut self.stage.world
+    }
+    /// What was done to the world so far, where it is recorded.
+    pub fn recording_so_far(&self) -> Option<&Recording> {
+        self.stage.world.recording()
+    }
+    /// What went wrong so far.
+    pub fn incidents(&self) -> impl Iterator<Item = &IncidentReport> {
+        self.incidents.iter().map(|(_, report)| report)
+    }
+    /// The threads with their names.
+    pub fn threads(&self) -> impl Iterator<Item = (&str, Handle<Rod>)> {
+        self.scene.threads.iter().map(|t| t.name.as_str()).zip(self.stage.threads.iter().copied())
+    }
+    /// The shapes with their names.
+    pub fn shapes(&self) -> impl Iterator<Item = (&str, Handle<sutura::Shape>)> {
+        self.scene.shapes.iter().map(|s| s.name.as_str()).zip(self.stage.shapes.iter().copied())
+    }
+    /// The grips with their names; `None` while they do not hold.
+    pub fn grips(&self) -> impl Iterator<Item = (&str, Option<Handle<Grip>>)> {
+        self.scene.grips.iter().enumerate().map(|(i, name)| (name.as_str(), self.stage.grip(i)))
+    }
+    /// The knot in which a thread (by its number in the scene) is tied now; it is recognized once a frame.
+    pub fn knot(&self, thread: usize) -> KnotReport {
+        self.stage.knot(thread)
+    }
+    /// How far it is.
+    pub fn now(&self) -> Progress {
+        self.progress()
     }
 
     /// The threads in the order of the scene.

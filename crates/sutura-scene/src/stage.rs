@@ -9,7 +9,7 @@ use crate::motion::{Motion, quintic};
 use crate::report::KnotReport;
 use crate::saved::{Event, SavedFile};
 use crate::scene::{Action, LoadDef, Mover, Scene, Step};
-use std::cell::RefCell;
+use std::sync::Mutex;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::Recorder;
 use sutura::knot::Entries;
@@ -120,7 +120,7 @@ pub struct Stage {
     pub probes: Vec<Value>,
     seed: u64,
     /// Recognitions at the present time, so that several checks share one.
-    knots: RefCell<Vec<(usize, KnotReport)>>,
+    knots: Mutex<Vec<(usize, KnotReport)>>,
     names: Names,
 }
 
@@ -186,7 +186,7 @@ impl Stage {
             judge: Judge::new(scene.audit),
             probes: vec![Value::Number(f64::NAN); scene.probes.len()],
             seed: scene.seed,
-            knots: RefCell::default(),
+            knots: Mutex::default(),
             names,
         };
         if let Some((path, location)) = &scene.start {
@@ -420,6 +420,10 @@ impl Stage {
     pub fn shape_pose(&self, shape: usize) -> Pose {
         self.world.shape(self.shapes[shape]).map_or(Pose::IDENTITY, |s| s.pose)
     }
+    /// A grip that holds.
+    pub fn grip(&self, grip: usize) -> Option<Handle<Grip>> {
+        self.grips[grip].map(|held| held.handle)
+    }
     /// Pose of a grip that holds.
     pub fn grip_pose(&self, grip: usize) -> Option<Pose> {
         self.grips[grip].and_then(|held| self.world.grip_pose(held.handle).ok())
@@ -441,8 +445,10 @@ impl Stage {
     }
     /// Recognizes the knot of a thread as it is now.
     pub fn knot(&self, thread: usize) -> KnotReport {
-        if let Some((_, knot)) = self.knots.borrow().iter().find(|(t, _)| *t == thread) {
-            return knot.clone();
+        // Nothing panics while it is locked.
+        let known = |knots: &mut Vec<(usize, KnotReport)>| knots.iter().find(|(t, _)| *t == thread).map(|(_, knot)| knot.clone());
+        if let Some(knot) = self.knots.lock().ok().and_then(|mut knots| known(&mut knots)) {
+            return knot;
         }
         let knot = match self.rod(thread) {
             Some(rod) => {
@@ -451,12 +457,16 @@ impl Stage {
             }
             None => KnotReport { name: "unknown".into(), determinant: 0, signature: 0, tried: 0, agreed: 0, form: None },
         };
-        self.knots.borrow_mut().push((thread, knot.clone()));
+        if let Ok(mut knots) = self.knots.lock() {
+            knots.push((thread, knot.clone()));
+        }
         knot
     }
     /// Forgets what held for the moment before.
     pub fn moment_passed(&mut self) {
-        self.knots.borrow_mut().clear();
+        if let Ok(knots) = self.knots.get_mut() {
+            knots.clear();
+        }
     }
     /// Least clearances so far, by the audit where it runs.
     pub fn clearances(&self) -> (Option<f64>, Option<f64>) {

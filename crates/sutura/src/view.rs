@@ -2,10 +2,10 @@
 
 use crate::math::{Pose, log};
 use crate::model::Model;
-use crate::model::material::SectionStiffness;
+use crate::model::material::{Material, SectionStiffness};
 use crate::model::rod::RodModel;
 use crate::model::section::{Profile, Section};
-use crate::model::shape::Geometry;
+use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::state::State;
 use glam::{DQuat, DVec3};
@@ -33,6 +33,10 @@ pub struct ShapeView<'a> {
     pub geometry: &'a Geometry,
     /// Where it is.
     pub pose: Pose,
+    /// What moves it.
+    pub motion: ShapeMotion,
+    /// Its surface for friction.
+    pub surface: u32,
     /// Its slot, unique among living shapes ([`Handle::index`](crate::Handle::index)).
     pub slot: usize,
 }
@@ -73,6 +77,8 @@ pub struct ContactView {
     pub normal: DVec3,
     /// Force on `a`, normal and friction \[N\].
     pub force: DVec3,
+    /// Whether it slid in the last substep; else it stuck.
+    pub sliding: bool,
 }
 
 /// The other side of a contact.
@@ -119,7 +125,13 @@ impl<'a> View<'a> {
     /// The living shapes in slot order.
     pub fn shapes(&self) -> impl Iterator<Item = ShapeView<'a>> + use<'a> {
         let (model, state) = (self.model, self.state);
-        model.shapes.iter().map(move |(slot, s)| ShapeView { geometry: &s.geometry, pose: state.shape_pose[slot as usize], slot: slot as usize })
+        model.shapes.iter().map(move |(slot, s)| ShapeView {
+            geometry: &s.geometry,
+            pose: state.shape_pose[slot as usize],
+            motion: s.motion,
+            surface: s.surface,
+            slot: slot as usize,
+        })
     }
     /// The living welds in slot order.
     pub fn welds(&self) -> impl Iterator<Item = WeldView<'a>> + use<'a> {
@@ -153,6 +165,14 @@ impl<'a> RodView<'a> {
     /// Number of joints between its elements.
     pub fn n_joints(&self) -> usize {
         self.n_elements() - usize::from(!self.is_closed())
+    }
+    /// What it is made of.
+    pub fn material(&self) -> &'a Material {
+        &self.rod.material
+    }
+    /// Its surface for friction.
+    pub fn surface(&self) -> u32 {
+        self.rod.surface
     }
     /// Radius with which it touches \[m\].
     pub fn radius(&self) -> f64 {

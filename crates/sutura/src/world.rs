@@ -74,6 +74,11 @@ impl World {
         Ok(())
     }
 
+    /// Friction between two surfaces: what was set for them, or the default of the settings.
+    pub fn friction(&self, a: u32, b: u32) -> Friction {
+        self.model.friction_between(a, b)
+    }
+
     /// Adds a thread.
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
         let low = spec.lower()?;
@@ -600,7 +605,7 @@ impl World {
     /// Reads a shape.
     pub fn shape(&self, shape: Handle<Shape>) -> Result<ShapeView<'_>, Error> {
         let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
-        Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], slot: shape.index() })
+        Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], motion: s.motion, surface: s.surface, slot: shape.index() })
     }
     /// Reads everything.
     pub fn view(&self) -> View<'_> {
@@ -623,6 +628,7 @@ impl World {
                 point: point(c.a, c.s),
                 normal: c.normal,
                 force: c.normal * c.normal_force + c.friction,
+                sliding: c.sliding,
             }
         });
         let shapes = self.state.shape_contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| ContactView {
@@ -632,6 +638,7 @@ impl World {
             point: point(c.element, c.s),
             normal: c.normal,
             force: c.normal * c.normal_force + c.friction,
+            sliding: c.sliding,
         });
         threads.chain(shapes)
     }

@@ -3,6 +3,7 @@
 use crate::fuzz;
 use crate::program::{self, GlbValidator, Profile};
 use crate::tally::{Tally, cargo, root};
+use crate::viewer;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -35,6 +36,7 @@ pub fn everything(tally: &mut Tally) {
     glb(tally, &recorded);
     same_bits(tally, &recorded);
     fuzz::run(tally, None, FUZZING);
+    viewer::check(tally);
 }
 
 /// All tests, those of the documentation among them: the command in the README, which goes on after the first failure here so that the

@@ -6,6 +6,7 @@ mod fuzz;
 mod program;
 mod release;
 mod tally;
+mod viewer;
 
 use std::process::ExitCode;
 use tally::Tally;
@@ -17,6 +18,7 @@ cargo xtask scenes [NAMES]   run sample scenes with the release build and valida
 cargo xtask bench [ARGS]     `sutura bench` with the release build
 cargo xtask fuzz [TARGET] [--minutes M]
                              fuzz one target or all, each for so long (10)
+cargo xtask viewer           the part of the whole check that is about the plugin for Bevy and the viewer
 cargo xtask bless            run the square knot and take its last picture for the README
 cargo xtask release          is this commit ready to be released? (changes nothing)";
 
@@ -42,6 +44,7 @@ fn main() -> ExitCode {
                 return usage(&problem);
             }
         }
+        "viewer" => viewer::check(&mut tally),
         "bless" => program::bless(&mut tally),
         "release" => release::ready(&mut tally),
         "help" | "--help" | "-h" => {

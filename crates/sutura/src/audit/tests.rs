@@ -22,7 +22,8 @@ impl Scene {
     }
     fn show(&self, audit: &mut Audit, time: f64) {
         let rods = self.rods.iter().map(|(slot, radius, x, rest)| RodSlice { slot: *slot, radius: *radius, positions: x, rest_lengths: rest });
-        let shapes = self.shapes.iter().map(|(slot, geometry, pose)| ShapeView { slot: *slot, geometry, pose: *pose });
+        let shapes =
+            self.shapes.iter().map(|(slot, geometry, pose)| ShapeView { slot: *slot, geometry, pose: *pose, motion: crate::ShapeMotion::Fixed, surface: 0 });
         audit.observe_slices(time, rods, shapes, core::iter::empty());
     }
 }

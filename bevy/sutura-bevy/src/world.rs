@@ -1,0 +1,85 @@
+//! The world that is stepped.
+
+use bevy::prelude::*;
+use std::any::Any;
+use sutura::input::{Recorder, Recording};
+use sutura::{Incident, Settings, World};
+
+/// What is stepped: a world, or something that holds one and does more in a frame of it (a scene with motions of its own).
+pub trait Simulation: Any + Send + Sync {
+    /// Reads the world.
+    fn world(&self) -> &World;
+    /// Changes the world.
+    fn edit(&mut self) -> &mut Recorder;
+    /// What was done to it, if it records.
+    fn recording(&self) -> Option<&Recording>;
+    /// One frame of physics of `dt` \[s\]. It may be done in pieces; before each `drive` is to be called with the part of the frame that will be
+    /// done with that piece, in (0, 1]. What went wrong comes back.
+    fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident>;
+}
+
+impl Simulation for Recorder {
+    fn world(&self) -> &World {
+        self
+    }
+    fn edit(&mut self) -> &mut Recorder {
+        self
+    }
+    fn recording(&self) -> Option<&Recording> {
+        Recorder::recording(self)
+    }
+    fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident> {
+        drive(self, 1.0);
+        Recorder::step(self, dt).incidents
+    }
+}
+
+/// The world of the engine, lengths in meters, and what it said of its last frame.
+#[derive(Resource)]
+pub struct Sutura {
+    simulation: Box<dyn Simulation>,
+    /// What went wrong in the last frame of physics. A step never fails: where it found no way it stands still and says so here.
+    pub incidents: Vec<Incident>,
+}
+
+impl Default for Sutura {
+    fn default() -> Self {
+        Sutura::new(Settings::default(), false).unwrap_or_else(|e| unreachable!("the default settings are valid: {e}"))
+    }
+}
+
+impl Sutura {
+    /// An empty world, which writes down what is done to it if it is to.
+    pub fn new(settings: Settings, record: bool) -> Result<Self, sutura::Error> {
+        Ok(Self::of(Recorder::new(settings, record)?))
+    }
+    /// A world of one's own.
+    pub fn of(simulation: impl Simulation) -> Self {
+        Sutura { simulation: Box::new(simulation), incidents: Vec::new() }
+    }
+    /// Reads the world.
+    pub fn world(&self) -> &World {
+        self.simulation.world()
+    }
+    /// Changes the world; what is done here is recorded.
+    pub fn edit(&mut self) -> &mut Recorder {
+        self.simulation.edit()
+    }
+    /// The simulation given to [`Sutura::of`], if it is of this type.
+    pub fn simulation<T: Simulation>(&self) -> Option<&T> {
+        let any: &dyn Any = &*self.simulation;
+        any.downcast_ref()
+    }
+    /// The same, to change it.
+    pub fn simulation_mut<T: Simulation>(&mut self) -> Option<&mut T> {
+        let any: &mut dyn Any = &mut *self.simulation;
+        any.downcast_mut()
+    }
+    /// Everything done so far, if the world records.
+    pub fn recording(&self) -> Option<&Recording> {
+        self.simulation.recording()
+    }
+    pub(crate) fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) {
+        self.incidents = self.simulation.step(dt, drive);
+    }
+}

@@ -1,0 +1,376 @@
+//! Panels: what is shown, how it runs, and what can be changed.
+
+use crate::control::{Typing, Viewer, go_to};
+use crate::keys::{Action, KEYS, OTHERS};
+use crate::source::Play;
+use crate::stage::{Prop, Stage};
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Color32, RichText, Ui};
+use bevy_egui::{EguiContext, PrimaryEguiContext};
+use std::collections::VecDeque;
+use sutura_bevy::sutura::knot::{Ends, recognize};
+use sutura_bevy::sutura::{Friction, Hold, Integrator, Settings, Shear, Solver};
+use sutura_bevy::{Grip, Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
+use sutura_scene::samples;
+
+/// Curves of the last seconds.
+#[derive(Resource, Debug, Default)]
+pub struct Curves {
+    tension: VecDeque<f64>,
+    force: VecDeque<f64>,
+    ms: VecDeque<f64>,
+    frames: u64,
+}
+
+/// Points of a curve: ten seconds at 60 a second.
+const POINTS: usize = 600;
+
+/// Takes down what the curves show.
+pub fn measure(mut curves: ResMut<Curves>, clock: Res<PhysicsClock>, sutura: Res<Sutura>, hand: Res<Hand>, grips: Query<&Grip>) {
+    if clock.frames == curves.frames {
+        return;
+    }
+    if clock.frames < curves.frames {
+        *curves = Curves::default();
+    }
+    curves.frames = clock.frames;
+    let tension = sutura.world().view().rods().map(|r| r.max_tension()).fold(0.0, f64::max);
+    let force = grips.iter().map(Grip::force).fold(hand.force.length(), f64::max);
+    for (curve, value) in [(0, tension), (1, force), (2, clock.ms)] {
+        let Curves { tension, force, ms, .. } = &mut *curves;
+        let curve = [tension, force, ms].into_iter().nth(curve);
+        if let Some(curve) = curve {
+            if curve.len() == POINTS {
+                curve.pop_front();
+            }
+            curve.push_back(value);
+        }
+    }
+}
+
+/// The knot of each thread, recognized a few times a second.
+#[derive(Resource, Debug, Default)]
+pub struct Knots {
+    names: Vec<String>,
+    at: f64,
+}
+
+/// Recognizes them.
+pub fn recognize_knots(mut knots: ResMut<Knots>, viewer: Res<Viewer>, time: Res<Time<Real>>, sutura: Res<Sutura>, strands: Query<(&Prop, &Strand)>, stage: Res<Stage>) {
+    if !viewer.knot || time.elapsed_secs_f64() < knots.at + 0.4 {
+        return;
+    }
+    knots.at = time.elapsed_secs_f64();
+    let live = stage.past.is_none().then(|| sutura.simulation::<Play>()).flatten();
+    let mut found: Vec<(usize, String)> = strands
+        .iter()
+        .map(|(prop, strand)| {
+            // In a scene that is played it is known which ends are held.
+            let name = match live {
+                Some(play) => play.0.knot(prop.0).name,
+                None if strand.positions.len() < 3 => return (prop.0, String::new()),
+                None => recognize(&strand.positions, if strand.skin.seam.is_some() { Ends::Closed } else { Ends::Free }, 1).to_string(),
+            };
+            (prop.0, name)
+        })
+        .collect();
+    found.sort();
+    knots.names = found.into_iter().map(|(_, name)| name).collect();
+}
+
+/// All panels.
+pub fn show(world: &mut World) {
+    let mut contexts = world.query_filtered::<&mut EguiContext, With<PrimaryEguiContext>>();
+    let Some(context) = contexts.iter_mut(world).next().map(|mut c| c.get_mut().clone()) else { return };
+    labels(world, &context);
+    let viewer = world.resource::<Viewer>().clone();
+    if viewer.panels {
+        scene_panel(world, &context);
+        parameter_panel(world, &context);
+        curve_panel(world, &context);
+    }
+    if viewer.help {
+        help(world, &context);
+    }
+    error_window(world, &context);
+    let over = context.is_pointer_over_egui() || context.egui_wants_pointer_input();
+    world.resource_mut::<Pointer>().busy = over;
+    world.resource_mut::<Typing>().0 = context.egui_wants_keyboard_input();
+}
+
+fn scene_panel(world: &mut World, context: &egui::Context) {
+    egui::Window::new("Scene").default_pos([10.0, 10.0]).default_width(250.0).show(context, |ui| {
+        let (title, name) = (world.resource::<Stage>().title.clone(), world.resource::<Stage>().name.clone());
+        ui.label(RichText::new(title).strong());
+        egui::ComboBox::from_id_salt("samples").selected_text(&name).width(220.0).show_ui(ui, |ui| {
+            for sample in samples() {
+                if ui.selectable_label(name == sample.name, sample.name).on_hover_text(sample.title).clicked() {
+                    world.resource_mut::<Viewer>().open = Some(sample.name.into());
+                }
+            }
+        });
+        let running = world.resource::<PhysicsClock>().running;
+        ui.horizontal(|ui| {
+            for (label, action) in [("⏮", Action::First), (if running { "⏸" } else { "▶" }, Action::PlayPause), ("⏭", Action::Step), ("⏺ now", Action::Latest), ("↺", Action::Reset)] {
+                let key = KEYS.iter().find(|k| k.3 == action).map_or("", |k| k.1);
+                if ui.button(label).on_hover_text(key).clicked() {
+                    world.resource_mut::<Viewer>().wanted.push(action);
+                }
+            }
+        });
+        let stage = world.resource::<Stage>();
+        let (first, last) = (stage.frames.first().map_or(0.0, |f| f.time), stage.frames.last().map_or(0.0, |f| f.time));
+        let mut time = stage.shown().map_or(last, |f| f.time);
+        let old = time;
+        ui.spacing_mut().slider_width = 150.0;
+        ui.add_enabled(last > first, egui::Slider::new(&mut time, first..=last.max(first + 1e-9)).suffix(" s").fixed_decimals(2));
+        if time != old {
+            go_to(world, time);
+        }
+        let mut clock = world.resource_mut::<PhysicsClock>();
+        ui.add(egui::Slider::new(&mut clock.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
+        let line = format!("{:.1} ms a frame, {:.2} x real time", clock.ms, clock.rate);
+        if clock.is_late() {
+            ui.colored_label(Color32::from_rgb(255, 150, 60), format!("{line}\nphysics cannot keep up: {:.1} s given up", clock.lost));
+        } else {
+            ui.label(line);
+        }
+        if let Some(play) = world.resource::<Sutura>().simulation::<Play>() {
+            let now = play.0.now();
+            ui.label(if now.finished { "the scene is over, the world goes on".into() } else { format!("phase {}", now.phase) });
+            for warning in play.0.warnings() {
+                ui.colored_label(Color32::from_rgb(255, 190, 80), &warning.message);
+            }
+            for incident in play.0.incidents() {
+                ui.colored_label(Color32::from_rgb(255, 120, 90), format!("{} ({} times)", incident.message, incident.count));
+            }
+        }
+        ui.separator();
+        let stout = world.query::<&Strand>().iter(world).map(|s| s.stoutness).fold(1.0, f64::max);
+        let mut viewer = world.resource_mut::<Viewer>();
+        ui.horizontal_wrapped(|ui| {
+            let v = &mut *viewer;
+            for (flag, name) in [
+                (&mut v.tension, "tension"),
+                (&mut v.frames, "frames"),
+                (&mut v.contacts, "contacts"),
+                (&mut v.primitives, "primitives"),
+                (&mut v.knot, "knot"),
+            ] {
+                ui.checkbox(flag, name);
+            }
+        });
+        ui.add(egui::Slider::new(&mut viewer.least_width, 0.0..=8.0).text("least width [pixels]"));
+        if viewer.tension {
+            ui.label(format!("blue 0 N, red {:.3} N", viewer.tension_scale.1));
+        }
+        if stout > 1.0 {
+            ui.label(format!("threads are drawn {stout:.1} times as wide as they are"));
+        }
+        if !viewer.message.is_empty() {
+            ui.label(&viewer.message);
+        }
+        ui.label(RichText::new("F1: keys").weak());
+    });
+}
+
+fn parameter_panel(world: &mut World, context: &egui::Context) {
+    let width = context.content_rect().width();
+    egui::Window::new("Parameters").default_pos([width - 290.0, 10.0]).default_width(265.0).default_open(false).vscroll(true).show(context, |ui| {
+        if world.resource::<Stage>().recorded {
+            ui.label("A recording: nothing to change.");
+            return;
+        }
+        let before = world.resource::<Sutura>().world().settings().clone();
+        let mut settings = before.clone();
+        settings_ui(ui, &mut settings);
+        if settings != before {
+            let result = world.resource_mut::<Sutura>().edit().set_settings(settings);
+            if let Err(e) = result {
+                world.resource_mut::<Viewer>().message = e.to_string();
+            }
+        }
+        friction_ui(ui, world);
+        ui.collapsing("Hand", |ui| {
+            let mut hand = world.resource_mut::<Hand>();
+            ui.horizontal(|ui| {
+                for (hold, name) in [(Hold::Pin, "pin"), (Hold::Clamp, "clamp"), (Hold::Jaw, "jaw")] {
+                    ui.selectable_value(&mut hand.hold, hold, name);
+                }
+            });
+            ui.add(egui::Slider::new(&mut hand.speed_limit, 0.01..=2.0).logarithmic(true).text("speed limit [m/s]"));
+            ui.add(egui::Slider::new(&mut hand.force_limit, 0.01..=20.0).logarithmic(true).text("force limit [N]"));
+            ui.add(egui::Slider::new(&mut world.resource_mut::<Viewer>().grip_speed, 0.001..=0.2).logarithmic(true).text("keys [m/s]"));
+        });
+        material_ui(ui, world);
+    });
+}
+
+fn settings_ui(ui: &mut Ui, s: &mut Settings) {
+    egui::CollapsingHeader::new("Solver and damping").default_open(true).show(ui, |ui| {
+        ui.horizontal(|ui| {
+            ui.label("gravity");
+            for k in 0..3 {
+                ui.add(egui::DragValue::new(&mut s.gravity[k]).speed(0.05).range(-50.0..=50.0));
+            }
+        });
+        let mut substeps = (1.0 / s.substep).round();
+        if ui.add(egui::Slider::new(&mut substeps, 60.0..=4000.0).logarithmic(true).text("substeps a second")).changed() {
+            s.substep = 1.0 / substeps;
+        }
+        ui.add(egui::Slider::new(&mut s.newton_max, 1..=50).text("Newton iterations"));
+        ui.add(egui::Slider::new(&mut s.tolerance, 1e-5..=0.1).logarithmic(true).text("tolerance [rad]"));
+        ui.add(egui::Slider::new(&mut s.halvings, 0..=12).text("halvings"));
+        ui.add(egui::Slider::new(&mut s.linear_damping, 0.0..=0.999).text("linear damping"));
+        ui.add(egui::Slider::new(&mut s.angular_damping, 0.0..=0.999).text("angular damping"));
+        ui.horizontal(|ui| {
+            ui.selectable_value(&mut s.integrator, Integrator::ImplicitEuler, "implicit Euler");
+            ui.selectable_value(&mut s.integrator, Integrator::TrBdf2, "TR-BDF2");
+        });
+        ui.label(match s.solver {
+            Solver::Direct => "solver: direct (fixed when the scene is made)",
+            Solver::Paper(_) => "solver: that of the paper (fixed when the scene is made)",
+        });
+    });
+}
+
+fn friction_ui(ui: &mut Ui, world: &mut World) {
+    ui.collapsing("Friction", |ui| {
+        let view = world.resource::<Sutura>().world().view();
+        let mut surfaces: Vec<u32> = view.rods().map(|r| r.surface()).chain(view.shapes().map(|s| s.surface)).collect();
+        let threads: Vec<u32> = view.rods().map(|r| r.surface()).collect();
+        surfaces.sort_unstable();
+        surfaces.dedup();
+        for (i, a) in surfaces.iter().enumerate() {
+            // Shapes do not touch each other.
+            for b in surfaces[i..].iter().filter(|b| threads.contains(a) || threads.contains(b)) {
+                let before = world.resource::<Sutura>().world().friction(*a, *b);
+                let mut now = before;
+                ui.label(format!("surfaces {a} and {b}"));
+                ui.add(egui::Slider::new(&mut now.stick, 0.0..=1.0).text("sticking"));
+                ui.add(egui::Slider::new(&mut now.slide, 0.0..=1.0).text("sliding"));
+                if now != before {
+                    // What slides holds no better than what sticks.
+                    let now = Friction { stick: now.stick, slide: now.slide.min(now.stick) };
+                    let result = world.resource_mut::<Sutura>().edit().set_friction(*a, *b, now);
+                    if let Err(e) = result {
+                        world.resource_mut::<Viewer>().message = e.to_string();
+                    }
+                }
+            }
+        }
+    });
+}
+
+/// What threads are made of: fixed when they are made, so it is shown and not changed.
+fn material_ui(ui: &mut Ui, world: &World) {
+    ui.collapsing("Material (fixed when the scene is made)", |ui| {
+        let world = world.resource::<Sutura>().world();
+        for rod in world.view().rods() {
+            let m = rod.material();
+            ui.label(RichText::new(format!("thread {}", rod.slot())).strong());
+            egui::Grid::new(rod.slot()).num_columns(2).show(ui, |ui| {
+                let mut row = |name: &str, value: String| {
+                    ui.label(name);
+                    ui.label(value);
+                    ui.end_row();
+                };
+                row("radius", format!("{:.4} mm", 1e3 * rod.radius()));
+                row("length", format!("{:.1} mm, {} elements", 1e3 * rod.rest_length(), rod.n_elements()));
+                row("Young's modulus", format!("{:.3} GPa", 1e-9 * m.young_modulus));
+                row("shear", match m.shear { Shear::Poisson(nu) => format!("Poisson's ratio {nu}"), Shear::Modulus(g) => format!("{:.3} GPa", 1e-9 * g) });
+                row("density", format!("{} kg/m³", m.density));
+                row("bending scale", format!("{}", m.bend_scale));
+                row("bending damping", format!("{} s", m.bend_damping));
+                row("plastic set", m.plasticity.as_ref().map_or("none".into(), |p| format!("from {:.0} 1/m on", p.yield_curvature)));
+            });
+        }
+    });
+}
+
+fn curve_panel(world: &mut World, context: &egui::Context) {
+    let height = context.content_rect().height();
+    let curves = world.resource::<Curves>();
+    egui::Window::new("Curves").default_pos([10.0, height - 260.0]).default_width(250.0).default_open(false).show(context, |ui| {
+        curve(ui, "greatest tension", "N", &curves.tension, None);
+        curve(ui, "force of the hand and grips", "N", &curves.force, None);
+        let frame = world.resource::<PhysicsClock>().frame;
+        curve(ui, "physics", "ms a frame", &curves.ms, Some(1e3 * frame));
+    });
+}
+
+/// A curve of the last seconds, with a line at what is wanted.
+fn curve(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f64>, mark: Option<f64>) {
+    let most = values.iter().copied().fold(mark.unwrap_or(0.0), f64::max).max(1e-6);
+    ui.label(format!("{name}: {:.3} {unit} (most {most:.3})", values.back().copied().unwrap_or(0.0)));
+    let (rect, _) = ui.allocate_exact_size(egui::vec2(240.0, 48.0), egui::Sense::hover());
+    let painter = ui.painter_at(rect);
+    painter.rect_filled(rect, 3.0, Color32::from_black_alpha(120));
+    let at = |i: usize, v: f64| {
+        egui::pos2(rect.left() + rect.width() * i as f32 / POINTS as f32, rect.bottom() - 2.0 - (rect.height() - 4.0) * (v / most).clamp(0.0, 1.0) as f32)
+    };
+    if let Some(mark) = mark {
+        painter.line_segment([at(0, mark), at(POINTS, mark)], (1.0, Color32::from_gray(110)));
+    }
+    let points: Vec<egui::Pos2> = values.iter().enumerate().map(|(i, v)| at(i, *v)).collect();
+    painter.line(points, (1.5, Color32::from_rgb(110, 220, 180)));
+}
+
+fn help(world: &mut World, context: &egui::Context) {
+    let mut open = true;
+    egui::Window::new("Keys").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).resizable(false).show(context, |ui| {
+        egui::ScrollArea::vertical().max_height(0.8 * context.content_rect().height()).show(ui, |ui| {
+            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+                for (key, what) in OTHERS.iter().copied().chain(KEYS.iter().map(|k| (k.1, k.2))) {
+                    ui.label(RichText::new(key).strong());
+                    ui.label(what);
+                    ui.end_row();
+                }
+            });
+        });
+    });
+    world.resource_mut::<Viewer>().help = open;
+}
+
+fn error_window(world: &mut World, context: &egui::Context) {
+    let Some(error) = world.resource::<Stage>().error.clone() else { return };
+    let mut open = true;
+    egui::Window::new("This cannot be opened").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
+        ui.label(RichText::new(error).monospace().color(Color32::from_rgb(255, 150, 120)));
+    });
+    if !open {
+        world.resource_mut::<Stage>().error = None;
+    }
+}
+
+/// Words in the picture: knots, and the force of what is held.
+fn labels(world: &mut World, context: &egui::Context) {
+    let painter = context.layer_painter(egui::LayerId::background());
+    let screen = context.content_rect();
+    if world.resource::<Viewer>().knot {
+        let names = &world.resource::<Knots>().names;
+        let text = names.iter().filter(|n| !n.is_empty()).cloned().collect::<Vec<_>>().join(", ");
+        painter.text(screen.center_bottom() - egui::vec2(0.0, 14.0), egui::Align2::CENTER_BOTTOM, text, egui::FontId::proportional(18.0), Color32::from_gray(225));
+    }
+    let mut marks: Vec<(Vec3, f64)> = Vec::new();
+    let space = *world.resource::<Space>();
+    let hand = world.resource::<Hand>().clone();
+    if let Some(Held::Body(_)) = hand.held {
+        marks.push((space.place(hand.at), hand.force.length()));
+    }
+    let mut grips = world.query::<&Grip>();
+    marks.extend(grips.iter(world).filter(|g| g.handle().is_some()).map(|g| (space.place(g.pose().position), g.force())));
+    let mut cameras = world.query_filtered::<(&Camera, &GlobalTransform), With<PointerCamera>>();
+    let Ok((camera, place)) = cameras.single(world) else { return };
+    for (at, force) in marks {
+        if let Ok(p) = camera.world_to_viewport(place, at) {
+            painter.text(
+                egui::pos2(p.x + 14.0, p.y - 10.0),
+                egui::Align2::LEFT_BOTTOM,
+                format!("{force:.3} N"),
+                egui::FontId::proportional(16.0),
+                Color32::from_rgb(255, 220, 120),
+            );
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! The viewer without a window or a renderer: keys, files, time.
+
+use bevy::input::keyboard::{Key, KeyboardInput, NativeKey};
+use bevy::input::{ButtonState, InputPlugin};
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use bevy::window::FileDragAndDrop;
+use std::time::Duration;
+use sutura_bevy::sutura::glam::DVec3;
+use sutura_bevy::sutura::input::Recording;
+use sutura_bevy::{Grip, Hand, Held, Live, PhysicsClock, Pointer, Space, Sutura};
+use sutura_view::ViewerPlugin;
+use sutura_view::control::{Viewer, open};
+use sutura_view::keys::{DRIVE, KEYS};
+use sutura_view::source::Play;
+use sutura_view::stage::Stage;
+
+fn app(scene: &str, folder: &std::path::Path) -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, InputPlugin, ViewerPlugin));
+    app.add_message::<FileDragAndDrop>();
+    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 60.0)));
+    app.world_mut().resource_mut::<PhysicsClock>().budget = Duration::from_secs(1000);
+    app.world_mut().resource_mut::<Viewer>().folder = folder.to_path_buf();
+    open(app.world_mut(), scene);
+    app.update();
+    app
+}
+
+/// A key as the window reports it.
+fn key(app: &mut App, key_code: KeyCode, state: ButtonState) {
+    let logical_key = Key::Unidentified(NativeKey::Unidentified);
+    app.world_mut().write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window: Entity::PLACEHOLDER });
+}
+
+fn press(app: &mut App, code: KeyCode) {
+    key(app, code, ButtonState::Pressed);
+    app.update();
+    key(app, code, ButtonState::Released);
+    app.update();
+}
+
+#[test]
+fn every_key_in_any_state_does_no_harm() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    // One frame of physics a picture: keys make it sixteen times as fast, and scenes may be heavy.
+    app.world_mut().resource_mut::<PhysicsClock>().budget = Duration::ZERO;
+    // In a scene, then in what stands there after a file that cannot be opened, then in a recording.
+    let recording = folder.path().join("trajectory.sutura");
+    for round in 0..3 {
+        let keys: Vec<KeyCode> = KEYS.iter().map(|k| k.0).chain(DRIVE.into_iter().flatten()).collect();
+        for code in keys {
+            press(&mut app, code);
+            // Help and messages are in the way of nothing.
+            app.world_mut().resource_mut::<Viewer>().open = None;
+        }
+        // Two at a time, held while time goes on.
+        for pair in KEYS.windows(2) {
+            key(&mut app, pair[0].0, ButtonState::Pressed);
+            press(&mut app, pair[1].0);
+            key(&mut app, pair[0].0, ButtonState::Released);
+        }
+        if round == 0 {
+            let trajectory = app.world().resource::<Stage>().trajectory();
+            assert!(!trajectory.frames.is_empty());
+            trajectory.write_to(&recording).unwrap();
+            open(app.world_mut(), "/no/such/file.toml");
+            assert!(app.world().resource::<Stage>().error.is_some());
+        } else {
+            open(app.world_mut(), recording.to_str().unwrap());
+            assert!(app.world().resource::<Stage>().recorded, "{:?}", app.world().resource::<Stage>().error);
+        }
+        app.update();
+    }
+    assert!(!app.should_exit().is_some_and(|e| e.is_error()));
+}
+
+#[test]
+fn a_bad_scene_shows_its_error_and_what_was_there_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    let bad = folder.path().join("bad.toml");
+    std::fs::write(&bad, "[[thread]]\nname = \"a\"\nlenght = \"10 cm\"\n").unwrap();
+    app.world_mut().write_message(FileDragAndDrop::DroppedFile { window: Entity::PLACEHOLDER, path_buf: bad });
+    app.update();
+    let stage = app.world().resource::<Stage>();
+    let said = stage.error.clone().unwrap();
+    assert!(said.contains("bad.toml") && said.contains("lenght"), "{said}");
+    assert_eq!(stage.name, "catenary");
+    assert!(app.world().resource::<Sutura>().simulation::<Play>().is_some());
+    // A good one dropped next is opened.
+    let good = folder.path().join("good.toml");
+    std::fs::write(&good, sutura_scene::samples().iter().find(|s| s.name == "capstan").unwrap().text).unwrap();
+    app.world_mut().write_message(FileDragAndDrop::DroppedFile { window: Entity::PLACEHOLDER, path_buf: good });
+    app.update();
+    let stage = app.world().resource::<Stage>();
+    assert!(stage.error.is_none() && stage.name.ends_with("good.toml"));
+}
+
+#[test]
+fn the_past_is_remembered_and_the_present_goes_on_from_where_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    for _ in 0..30 {
+        app.update();
+    }
+    let now = app.world().resource::<Sutura>().world().time();
+    let hash = app.world().resource::<Sutura>().world().state_hash();
+    press(&mut app, KeyCode::ArrowLeft);
+    let stage = app.world().resource::<Stage>();
+    assert!((stage.shown().unwrap().time - (now - 0.1)).abs() < 0.02);
+    assert!(!app.world().resource::<Live>().0 && !app.world().resource::<PhysicsClock>().running);
+    press(&mut app, KeyCode::Home);
+    assert_eq!(app.world().resource::<Stage>().past, Some(0));
+    press(&mut app, KeyCode::End);
+    assert!(app.world().resource::<Live>().0);
+    // Looking at the past changed nothing.
+    assert_eq!(app.world().resource::<Sutura>().world().state_hash(), hash);
+    press(&mut app, KeyCode::Period);
+    let one = app.world().resource::<Sutura>().world().time();
+    assert!((one - now - 1.0 / 60.0).abs() < 1e-9, "{one} {now}");
+    // From the beginning.
+    press(&mut app, KeyCode::Backspace);
+    assert!(app.world().resource::<Sutura>().world().time() < 0.1);
+}
+
+#[test]
+fn a_hand_in_a_scene_is_recorded_with_it_and_done_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("free_thread", folder.path());
+    let rod = |app: &App| {
+        let world = app.world().resource::<Sutura>().world();
+        let rod = world.view().rods().next().unwrap();
+        rod.positions()[rod.n_elements() / 2]
+    };
+    let at = rod(&app);
+    let space = *app.world().resource::<Space>();
+    let look = |app: &mut App, at: DVec3, pressed: bool| {
+        let ray = Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
+        let mut pointer = app.world_mut().resource_mut::<Pointer>();
+        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) = (Some(ray), space.direction(DVec3::Y), pressed, 0.02);
+        app.update();
+    };
+    look(&mut app, at, true);
+    assert!(matches!(app.world().resource::<Hand>().held, Some(Held::Thread(_))));
+    let mut most = 0.0f64;
+    for k in 1..=30 {
+        look(&mut app, at + DVec3::new(-0.0005, 0.0, 0.001) * f64::from(k), true);
+        most = most.max(app.world().resource::<Hand>().force.length());
+    }
+    assert!((rod(&app) - at - DVec3::new(-0.015, 0.0, 0.03)).length() < 1e-4, "{}", rod(&app) - at);
+    assert!(most > 0.0);
+    look(&mut app, at, false);
+    assert_eq!(app.world().resource::<Hand>().held, None);
+    // The file of what was done gives the same state.
+    press(&mut app, KeyCode::Space);
+    press(&mut app, KeyCode::F5);
+    let file = std::fs::read_dir(folder.path()).unwrap().filter_map(|e| e.ok()).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
+    let bytes = std::fs::read(file.unwrap()).unwrap();
+    let again = Recording::from_bytes(&bytes).unwrap().replay(&mut |step| {
+        assert!(step.is_same(), "step {}", step.step);
+        std::ops::ControlFlow::Continue(())
+    });
+    assert_eq!(again.unwrap().state_hash(), app.world().resource::<Sutura>().world().state_hash());
+}
+
+#[test]
+fn keys_take_two_ends_and_move_them() {
+    let folder = tempfile::tempdir().unwrap();
+    // Both ends are held by the scene: its grips are taken over.
+    let mut app = app("catenary", folder.path());
+    press(&mut app, KeyCode::Digit1);
+    press(&mut app, KeyCode::Digit2);
+    for _ in 0..5 {
+        app.update();
+    }
+    let poses = |app: &mut App| {
+        let grips = app.world().resource::<Viewer>().grips;
+        grips.map(|g| app.world().get::<Grip>(g.unwrap()).unwrap().pose().position)
+    };
+    let before = poses(&mut app);
+    for code in [KeyCode::KeyW, KeyCode::KeyK] {
+        key(&mut app, code, ButtonState::Pressed);
+    }
+    for _ in 0..30 {
+        app.update();
+    }
+    let after = poses(&mut app);
+    let speed = app.world().resource::<Viewer>().grip_speed;
+    // One up and one down in the picture, at the speed of the keys.
+    for (side, way) in [(0, 1.0), (1, -1.0)] {
+        let moved = after[side] - before[side];
+        assert!((moved.length() - 0.5 * speed).abs() < 0.05 * speed, "{moved}");
+        assert!(moved.z * way > 0.0, "{moved}");
+    }
+    press(&mut app, KeyCode::Digit1);
+    assert!(app.world().resource::<Viewer>().grips[0].is_none() && app.world().resource::<Viewer>().grips[1].is_some());
+}
+
+#[test]
+fn the_present_is_written_as_glb() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    for _ in 0..10 {
+        app.update();
+    }
+    press(&mut app, KeyCode::F9);
+    let message = app.world().resource::<Viewer>().message.clone();
+    let bytes = std::fs::read(folder.path().join("001.glb")).unwrap_or_else(|e| panic!("{e}: {message}"));
+    assert_eq!(&bytes[..4], b"glTF");
+}

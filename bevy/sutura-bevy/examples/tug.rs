@@ -69,6 +69,12 @@ fn pull(keys: Res<ButtonInput<KeyCode>>, mut grips: Query<(&mut Grip, &Player)>,
 fn score(grips: Query<&Grip>, mut windows: Query<&mut Window>) {
     let mut ends = grips.iter().map(|g| (g.force(), g.pose().position.z));
     let (Some((left, a)), Some((right, b)), Ok(mut window)) = (ends.next(), ends.next(), windows.single_mut()) else { return };
-    let ahead = if (a - b).abs() < 2.0 * POST { "even" } else if a < b { "left leads" } else { "right leads" };
+    let ahead = if (a - b).abs() < 2.0 * POST {
+        "even"
+    } else if a < b {
+        "left leads"
+    } else {
+        "right leads"
+    };
     window.title = format!("tug: left {left:.2} N, right {right:.2} N, {ahead}");
 }

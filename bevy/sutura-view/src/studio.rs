@@ -128,11 +128,14 @@ impl Studio {
         self.app.update();
     }
 
-    /// Looks at everything as the scene wants it, or closer.
-    pub fn frame(&mut self, zoom: f64) {
+    /// Looks at everything as the scene wants it, or closer, or at another point \[m\].
+    pub fn frame(&mut self, zoom: f64, at: Option<[f64; 3]>) {
         let aspect = self.size.0 as f32 / self.size.1 as f32;
         let world = self.app.world_mut();
-        let orbit = stage::frame_view(world, aspect, zoom as f32);
+        let mut orbit = stage::frame_view(world, aspect, zoom as f32);
+        if let Some(at) = at {
+            orbit.target = world.resource::<Space>().place(DVec3::from_array(at));
+        }
         world.insert_resource(orbit);
         stage::thicken(world, self.size.1);
     }

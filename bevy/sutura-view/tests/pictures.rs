@@ -81,7 +81,7 @@ fn each_sample_scene_has_its_threads_where_they_are() {
     for sample in samples() {
         studio.open(sample.name).unwrap();
         studio.go(0.25);
-        studio.frame(1.0);
+        studio.frame(1.0, None);
         paint(studio.world());
         let picture = studio.draw().unwrap();
         let radius = studio.world().query::<&Strand>().iter(studio.world()).map(|s| s.skin.radius).fold(0.0, f64::max);
@@ -115,7 +115,7 @@ fn a_recording_is_drawn_like_the_run_that_it_is_of() {
     for name in [path.to_str().unwrap(), "hanging_helix"] {
         studio.open(name).unwrap();
         studio.go(time);
-        studio.frame(1.0);
+        studio.frame(1.0, None);
         paint(studio.world());
         let picture = studio.draw().unwrap();
         let width = studio.width(0.0);
@@ -133,7 +133,7 @@ fn the_graphics_processor_skins_as_the_engine_does() {
     // Closed, twisted, and wound up: every bone turns.
     studio.open("twisted_ring").unwrap();
     studio.go(1.0);
-    studio.frame(1.0);
+    studio.frame(1.0, None);
     paint(studio.world());
     let by_graphics = studio.draw().unwrap();
     // The same skin, posed by the engine and drawn as it is.

@@ -2,7 +2,7 @@
 //! over to their side wins. Only the plugin's public interface is used.
 
 use bevy::prelude::*;
-use sutura_bevy::sutura::glam::DVec3;
+use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::{Friction, Geometry, Hold, Material, Place, Pose, RodSpec, ShapeSpec};
 use sutura_bevy::{Body, Grip, PhysicsFrame, PhysicsSet, Space, Sutura, SuturaPlugin, Thread};
 
@@ -43,7 +43,7 @@ fn set_up(mut commands: Commands, mut sutura: ResMut<Sutura>, space: Res<Space>)
     let material = Material { bend_damping: 0.01, bend_scale: 0.05, ..Material::elastic(2e9, 1150.0) };
     let thread = commands.spawn(Thread::new(RodSpec::new(points, 0.15e-3, material))).id();
     // The axis of a cylinder is its z.
-    let lying = sutura_bevy::sutura::glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let lying = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let post = Geometry::Cylinder { radius: POST, half_length: 0.01 };
     commands.spawn(Body::new(ShapeSpec::fixed(post, Pose::new(DVec3::ZERO, lying))));
     commands.spawn((Grip::new(thread, Place::Start, Hold::Pin), Player(KeyCode::KeyA, KeyCode::KeyD)));

@@ -10,6 +10,7 @@ use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::settings::{Backends, WgpuSettings};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
@@ -78,12 +79,14 @@ const PATIENCE: u32 = 100;
 impl Studio {
     /// A studio for pictures of this size. It wants a Vulkan driver; one in software does.
     pub fn new(size: (u32, u32)) -> Studio {
+        // OpenGL looks for a display, and complains where there is none.
+        let settings = WgpuSettings { backends: Some(Backends::PRIMARY), ..default() };
         let mut app = App::new();
         app.add_plugins(
             DefaultPlugins
                 .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
                 // Nothing is drawn before everything is there.
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+                .set(RenderPlugin { synchronous_pipeline_compilation: true, render_creation: settings.into(), ..default() })
                 .set(quiet())
                 .disable::<WinitPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),

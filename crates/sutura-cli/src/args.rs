@@ -328,7 +328,8 @@ pub struct Presets {
 /// Measure the speed of this build on this machine.
 #[derive(Args, Debug)]
 #[command(after_help = "\
-A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; then the overhand and the square knot are tied and a plectoneme is wound. \
+A free thread (15 cm, radius 0.1 mm, one end pinned) is dropped, 60 frames a second; swings are compared with their path; the tube that \
+draws a thread is posed; then the overhand and the square knot are tied and a plectoneme is wound. \
 Times are CPU times of the solver on one core; the median of a frame is the number to compare. Build with --release.
 
 Examples:
@@ -460,7 +461,7 @@ them with their radius.
 Frames are those that there are, at most --fps a second; the same input gives the same bytes.
 
 Examples:
-  sutura export square_knot --out knot.glb          run a scene, for a game engine
+  sutura export square_knot --out knot.glb --up z   run a scene, for a game engine
   sutura export out/overhand/trajectory.sutura --out overhand.glb --fps 60
                                                     what was recorded
   sutura export overhand --format vtk --out /tmp/overhand --to 2
@@ -495,12 +496,26 @@ pub struct Export {
     /// Rings of vertices an element (glb, obj)
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=64))]
     pub rings: u16,
+    /// Axis of the scene that viewers show as up (glb)
+    #[arg(long, value_enum, value_name = "AXIS", default_value_t = Axis::Y)]
+    pub up: Axis,
     /// Value for a key of the scene instead of its own, as in `sutura run`
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting)]
     pub settings: Vec<(String, String)>,
     /// Draw no progress bar, print nothing
     #[arg(long, short)]
     pub quiet: bool,
+}
+
+/// Axis of a scene.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// As in glTF: nothing is turned
+    Y,
+    /// Against gravity, where a scene does not say otherwise
+    Z,
+    /// The third one
+    X,
 }
 
 /// Kind of file.

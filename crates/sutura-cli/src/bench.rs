@@ -6,6 +6,7 @@ use crate::{run, say, say_json, table};
 use anyhow::Context as _;
 use cpu_time::ThreadTime;
 use sutura::glam::DVec3;
+use sutura::skin::{Bone, Skin, SkinSpec};
 use sutura::{GripSpec, Hold, Integrator, Material, Place, RodSpec, Settings, Shear, Stretch, World};
 use sutura_scene::Runner;
 
@@ -15,7 +16,18 @@ struct Measured {
     machine: Machine,
     free_thread: Vec<FreeThread>,
     free_swing: Vec<FreeSwing>,
+    skin: Option<SkinTime>,
     knots: Vec<Knot>,
+}
+
+/// Cost of what is drawn.
+#[derive(serde::Serialize)]
+struct SkinTime {
+    elements: usize,
+    vertices: usize,
+    /// Bones, positions and normals, once.
+    ms_median: f64,
+    ms_per_10_000: f64,
 }
 
 #[derive(serde::Serialize)]
@@ -77,7 +89,7 @@ const RADIUS: f64 = 1e-4;
 pub fn bench(args: &Bench) -> anyhow::Result<()> {
     let counts = if args.elements.is_empty() { vec![40, 120, 500, 2000] } else { args.elements.clone() };
     let shapes = args.shape.map_or_else(|| vec![FreeShape::Straight, FreeShape::Helix], |s| vec![s]);
-    let mut measured = Measured { machine: machine(), free_thread: Vec::new(), free_swing: Vec::new(), knots: Vec::new() };
+    let mut measured = Measured { machine: machine(), free_thread: Vec::new(), free_swing: Vec::new(), skin: None, knots: Vec::new() };
     if !args.knots {
         for shape in shapes {
             for &n in &counts {
@@ -85,6 +97,7 @@ pub fn bench(args: &Bench) -> anyhow::Result<()> {
             }
         }
         measured.free_swing = free_swings()?;
+        measured.skin = Some(skin()?);
     }
     if !args.free {
         let rod_ns = measured.free_thread.iter().map(|f| f.ns_per_element_iteration).reduce(f64::min);
@@ -93,6 +106,28 @@ pub fn bench(args: &Bench) -> anyhow::Result<()> {
         }
     }
     if args.json { say_json(&measured) } else { say(&as_tables(&measured)) }
+}
+
+/// The tube of a thread of 192 elements that hangs in a helix: some 10 000 vertices.
+fn skin() -> anyhow::Result<SkinTime> {
+    let material = Material::elastic(1e9, 1150.0);
+    let mut world = World::new(Settings::default())?;
+    let rod = world.insert_rod(&RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * 3e-3, 6.0, LENGTH / 30.0, 192, RADIUS, material))?;
+    let view = world.rod(rod)?;
+    let skin = Skin::new(&SkinSpec::of(&view))?;
+    let n = skin.n_vertices();
+    let (mut bones, mut positions, mut normals) = (vec![Bone::default(); skin.n_bones()], vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
+    let mut ms: Vec<f64> = (0..500)
+        .map(|_| {
+            let start = ThreadTime::now();
+            skin.bones(&view, &mut bones);
+            skin.pose(std::hint::black_box(&bones), &mut positions, &mut normals);
+            std::hint::black_box((&positions, &normals));
+            1e3 * start.elapsed().as_secs_f64()
+        })
+        .collect();
+    let ms_median = quantile(&mut ms, 0.5);
+    Ok(SkinTime { elements: skin.n_elements(), vertices: n, ms_median, ms_per_10_000: 1e4 * ms_median / n as f64 })
 }
 
 fn free_thread(shape: FreeShape, elements: u32, frames: u32) -> anyhow::Result<FreeThread> {
@@ -285,6 +320,10 @@ fn as_tables(m: &Measured) -> String {
         out.push_str(&format!(
             "\n15 cm, radius 0.25 mm, 120 elements, E 10 MPa, clamped, let go level; times with drag; RMS of the end from its converged path\n{t}\n"
         ));
+    }
+    if let Some(s) = &m.skin {
+        let (n, of, ms, each) = (s.vertices, s.elements, s.ms_median, s.ms_per_10_000);
+        out.push_str(&format!("\nskin of {n} vertices (12 around, 4 rings an element, {of} elements): {ms:.4} ms median, {each:.4} ms for 10 000\n"));
     }
     if !m.knots.is_empty() {
         let mut t = table(

@@ -1,10 +1,11 @@
 //! The command `sutura export`: scenes and recordings as files that other programs open.
 
-use crate::args::{Export, ExportFormat};
+use crate::args::{Axis, Export, ExportFormat};
 use crate::{run, say};
 use anyhow::{Context as _, bail};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::path::{Path, PathBuf};
+use sutura::glam::DVec3;
 use sutura_scene::export::{Exporter, Format, Moment, Options, Written};
 use sutura_scene::{Runner, Trajectory};
 
@@ -28,7 +29,12 @@ pub fn export(args: &Export) -> anyhow::Result<()> {
         (None, None) => bail!("which format? Give `--format glb` (or vtk, obj, csv), or a file name that says it: `--out {}.glb`", header.scene),
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&header.scene, format));
-    let options = Options { rate: args.fps, from: args.from, to: args.to.unwrap_or(f64::INFINITY), sides: args.sides.into(), rings: args.rings.into() };
+    let up = match args.up {
+        Axis::X => DVec3::X,
+        Axis::Y => DVec3::Y,
+        Axis::Z => DVec3::Z,
+    };
+    let options = Options { rate: args.fps, from: args.from, to: args.to.unwrap_or(f64::INFINITY), sides: args.sides.into(), rings: args.rings.into(), up };
     let mut exporter = Exporter::new(format, &header, &out, options)?;
     let written = match source {
         Source::Recording(t) => {

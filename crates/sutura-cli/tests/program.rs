@@ -66,10 +66,10 @@ fn help_teaches() {
     let out = sutura(folder.path(), &["--help"]);
     assert_eq!(out.status.code(), Some(0));
     let help = text(&out.stdout);
-    for word in ["run", "scenes", "knot", "knot-strength", "presets", "bench", "Examples:", "Exit codes"] {
+    for word in ["run", "scenes", "knot", "knot-strength", "presets", "bench", "export", "Examples:", "Exit codes"] {
         assert!(help.contains(word), "`{word}` is in the help");
     }
-    for command in ["run", "scenes", "knot", "knot-strength", "presets", "bench"] {
+    for command in ["run", "scenes", "knot", "knot-strength", "presets", "bench", "export"] {
         let out = sutura(folder.path(), &[command, "--help"]);
         assert_eq!(out.status.code(), Some(0), "{command}");
         assert!(text(&out.stdout).contains("Examples:"), "{command} --help has examples");
@@ -82,7 +82,7 @@ fn bad_input_ends_with_two_and_says_why() {
     std::fs::write(folder.path().join("bad.toml"), SWING.replace("elements", "elemnts")).unwrap();
     std::fs::write(folder.path().join("bad.csv"), "x,y,z\n0,0,0\n1,0,0\n1,fish,0\n").unwrap();
     // Line 10 of the scene is the misspelled key; line 4 of the table is the one with the fish.
-    let cases: [(&[&str], &[&str]); 12] = [
+    let cases: [(&[&str], &[&str]); 17] = [
         (&["run", "bad.toml"], &["bad.toml:10", "elemnts", "elements"]),
         (&["run", "nowhere/none.toml"], &["nowhere/none.toml"]),
         (&["run", "capstn"], &["capstn", "capstan"]),
@@ -95,6 +95,11 @@ fn bad_input_ends_with_two_and_says_why() {
         (&["knot-strength", "--pretension", "2 mm"], &["2 mm", "force"]),
         (&["knot-strength", "--diameter", "0.3mm"], &["--strength"]),
         (&["scenes", "show", "capstn"], &["capstan"]),
+        (&["export", "capstn", "--out", "x.glb"], &["capstn", "capstan"]),
+        (&["export", "capstan"], &["--format glb", "--out capstan.glb"]),
+        (&["export", "capstan", "--out", "x.glb", "--sides", "2"], &["--sides", "3..=256"]),
+        (&["export", "capstan", "--out", "bad.toml/x.glb"], &["cannot write bad.toml"]),
+        (&["export", "capstan", "--out", "x.glb", "--from", "2", "--to", "1"], &["from 2 s to 1 s"]),
     ];
     for (args, words) in cases {
         let out = sutura(folder.path(), args);
@@ -262,6 +267,7 @@ fn bench_measures_and_names_the_machine() {
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(json["machine"]["cores"].as_u64() >= Some(1) && json["machine"]["build"].is_string());
+    assert!(json["skin"]["vertices"].as_u64() > Some(9000) && json["skin"]["ms_median"].as_f64() > Some(0.0));
     let row = &json["free_thread"][0];
     assert!(row["ms_median"].as_f64() > Some(0.0) && row["ms_p99"].as_f64() >= row["ms_median"].as_f64());
     // Inextensible means to a thousandth of a percent.
@@ -300,6 +306,35 @@ fn values_of_a_scene_can_be_set() {
     let wrong = run(&["thread.thread.elments=5"]);
     assert_eq!(wrong.status.code(), Some(2));
     assert!(text(&wrong.stderr).contains("thread.thread.elments = 5") && text(&wrong.stderr).contains("`elements`"), "{}", text(&wrong.stderr));
+}
+
+#[test]
+fn scenes_and_recordings_are_exported() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    write_swing(folder.path(), "0 m");
+    let said = |args: &[&str]| {
+        let output = sutura(folder.path(), args);
+        assert!(output.status.success(), "{args:?}: {}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    said(&["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "swing"]);
+    let recording = "swing/trajectory.sutura";
+    // Six frames of a tenth of a second at 60 a second, and the start; every second one of them.
+    let out = said(&["export", recording, "--out", "swing.glb"]);
+    assert!(out.starts_with("4 frames") && out.contains("swing.glb"), "{out}");
+    let glb = std::fs::read(folder.path().join("swing.glb")).expect("a file");
+    assert!(glb.starts_with(b"glTF"));
+    assert!(said(&["export", recording, "--out", "all.csv", "--fps", "60", "--to", "0.05"]).starts_with("4 frames"));
+    assert!(said(&["export", recording, "--out", "last.obj", "--quiet"]).is_empty());
+    // A scene is run, and knows its forces; a recording has none.
+    said(&["export", "swing.toml", "--format", "vtk", "--out", "live", "--set", "thread.thread.elements=10"]);
+    said(&["export", recording, "--format", "vtk"]);
+    let field = |file: &str| std::fs::read_to_string(folder.path().join(file)).expect("a file").contains("\"tension\"");
+    assert!(field("live/threads_00003.vtp") && !field("out/swing/vtk/threads_00003.vtp"));
+    assert!(folder.path().join("live/threads.pvd").is_file() && !folder.path().join("live/shapes.pvd").exists());
+    let refused = sutura(folder.path(), &["export", recording, "--out", "x.glb", "--from", "9"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(text(&refused.stderr).contains("the recording goes from 0 s to 0.1 s"), "{}", text(&refused.stderr));
 }
 
 #[test]

@@ -49,11 +49,13 @@ pub struct Options {
     pub sides: u32,
     /// Rings of vertices an element.
     pub rings: u32,
+    /// Direction of the scene that is up where glTF says what is up, a unit vector: y as in glTF turns nothing. Other formats are not turned.
+    pub up: DVec3,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { rate: 30.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4 }
+        Options { rate: 30.0, from: 0.0, to: f64::INFINITY, sides: 12, rings: 4, up: DVec3::Y }
     }
 }
 
@@ -144,7 +146,7 @@ pub struct Exporter {
     header: Header,
     options: Options,
     out: Output,
-    writer: Option<Writer>,
+    writer: Option<Box<dyn Writer>>,
     format: Format,
     /// Number of the next moment by the rate.
     due: u64,
@@ -152,11 +154,10 @@ pub struct Exporter {
     seen: Option<(f64, f64)>,
 }
 
-enum Writer {
-    Glb(glb::Glb),
-    Vtk(vtk::Vtk),
-    Obj(obj::Obj),
-    Csv(csv::Csv),
+/// A kind of file as it is written.
+trait Writer {
+    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError>;
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError>;
 }
 
 /// Writes files and counts their bytes.
@@ -180,6 +181,9 @@ impl Exporter {
         }
         if options.from.is_nan() || options.to.is_nan() || options.from > options.to {
             return bad(format!("from {} s to {} s: wanted the first time not after the last", options.from, options.to));
+        }
+        if !options.up.is_normalized() {
+            return bad(format!("up is {}: wanted a unit vector", options.up));
         }
         let out = Output { path: out.to_path_buf(), bytes: 0 };
         // Now, so that what cannot be written is found before the work.
@@ -212,20 +216,14 @@ impl Exporter {
             None => {
                 let looks = || Looks::new(&self.header, moment, &self.options);
                 self.writer.insert(match self.format {
-                    Format::Glb => Writer::Glb(glb::Glb::new(looks()?, &self.header)),
-                    Format::Vtk => Writer::Vtk(vtk::Vtk::new(looks()?)),
-                    Format::Obj => Writer::Obj(obj::Obj::new(looks()?, &self.header)),
-                    Format::Csv => Writer::Csv(csv::Csv::new()),
+                    Format::Glb => Box::new(glb::Glb::new(looks()?, &self.header, self.options.up)),
+                    Format::Vtk => Box::new(vtk::Vtk::new(looks()?)),
+                    Format::Obj => Box::new(obj::Obj::new(looks()?, &self.header)),
+                    Format::Csv => Box::new(csv::Csv::new()),
                 })
             }
         };
-        match writer {
-            Writer::Glb(w) => w.add(&fitted(&self.header, moment)),
-            Writer::Vtk(w) => w.add(&self.header, moment, &mut self.out)?,
-            Writer::Obj(w) => w.add(&fitted(&self.header, moment), &mut self.out)?,
-            Writer::Csv(w) => w.add(&self.header, moment),
-        }
-        Ok(())
+        writer.add(&self.header, moment, &mut self.out)
     }
 
     /// Writes what is left to write.
@@ -234,12 +232,7 @@ impl Exporter {
             let (first, last) = self.seen.unwrap_or((0.0, 0.0));
             return Err(ExportError::Nothing { from: self.options.from, to: self.options.to, first, last });
         };
-        match writer {
-            Writer::Glb(w) => w.finish(&mut self.out)?,
-            Writer::Vtk(w) => w.finish(&mut self.out)?,
-            Writer::Obj(w) => w.finish(&mut self.out)?,
-            Writer::Csv(w) => w.finish(&mut self.out)?,
-        }
+        writer.finish(&mut self.out)?;
         Ok(Written { moments: self.moments, bytes: self.out.bytes })
     }
 }
@@ -306,11 +299,11 @@ impl Looks {
             let spec = SkinSpec { sides: options.sides, rings: options.rings, ..tube(thread, strand) };
             skins.push(Skin::new(&spec).map_err(|source| ExportError::Tube { thread: thread.name.clone(), source })?);
         }
-        // A plane reaches half as far again as the threads at the beginning.
+        // A plane reaches three times as far as the threads at the beginning.
         let points = || first.threads.iter().flat_map(|t| &t.positions);
         let shape = |(shape, pose): (&crate::trajectory::Shape, &Pose)| {
             let reach = points().map(|x| (*x - pose.position).length()).fold(1e-2, f64::max);
-            shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 1.5 * reach)
+            shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 3.0 * reach)
         };
         Ok(Looks { skins, shapes: header.shapes.iter().zip(&first.shapes).map(shape).collect() })
     }
@@ -334,7 +327,7 @@ fn tube(thread: &Thread, strand: &Strand) -> SkinSpec {
 fn fitted(header: &Header, moment: &Moment) -> Moment {
     let mut fitted = moment.clone();
     for (thread, strand) in header.threads.iter().zip(&mut fitted.threads) {
-        refit(thread.elements, &mut strand.positions, &mut strand.orientations, |a, b, u| a.lerp(b, u));
+        refit(thread.elements, &mut strand.positions, &mut strand.orientations, DVec3::lerp);
     }
     fitted
 }

@@ -4,8 +4,32 @@
 //! middles of the elements, d1 along x: a bone's pose is the middle of its element and its material frame, so that a texture shows twist. Each
 //! vertex follows up to four bones by linear blending, what every game engine does on the graphics processor; [`Skin::pose`] does the same here.
 //!
-//! Weights are those of a quadratic B-spline over three bones ([`Blend::Smooth`]). Where neighboring elements turn by an angle a, the radius in the
-//! plane of the bend shrinks by 1 - cos(a / 2) at most, that across not at all.
+//! Weights are those of a quadratic B-spline over three bones ([`Blend::Smooth`]). Where neighboring elements turn by an angle a, blending takes a part
+//! 1 - cos(a / 2) of the width in the plane of the bend and nothing of that across; a bone's scale gives both half of it back, so that the area stays.
+//!
+//! ```
+//! use sutura::glam::DVec3;
+//! use sutura::skin::{Bone, Skin, SkinSpec};
+//! use sutura::{Material, RodSpec, Settings, World};
+//!
+//! # fn main() -> Result<(), sutura::Error> {
+//! let mut world = World::new(Settings::default())?;
+//! let thread = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 100, 1e-4, Material::elastic(2e9, 1150.0));
+//! let rod = world.insert_rod(&thread)?;
+//! let skin = Skin::new(&SkinSpec { sides: 8, ..SkinSpec::of(&world.rod(rod)?) })?;
+//! let mut bones = vec![Bone::default(); skin.n_bones()];
+//!
+//! // Each frame: the bones, to the graphics processor with `joints`, `weights` and `bind` of the skin ...
+//! world.step(1.0 / 60.0);
+//! skin.bones(&world.rod(rod)?, &mut bones);
+//!
+//! // ... or the vertices.
+//! let mut positions = vec![[0.0; 3]; skin.n_vertices()];
+//! let mut normals = vec![[0.0; 3]; skin.n_vertices()];
+//! skin.pose(&bones, &mut positions, &mut normals);
+//! # Ok(())
+//! # }
+//! ```
 
 use crate::error::{Error, check};
 use crate::math::{Pose, exp};
@@ -70,18 +94,21 @@ pub struct SkinSpec {
     pub blend: Blend,
 }
 
-/// Where a bone is: the middle of an element and its material frame.
+/// Where a bone is: the middle of an element and its material frame. As a transform of a game engine: this translation and rotation, the scale
+/// `(scale, scale, 1)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
     /// Middle of the element in the world \[m\].
     pub position: Vec3,
     /// `world_from_material`.
     pub orientation: Quat,
+    /// Factor on the cross-section, along d1 and d2: 1 where the thread is straight, more where blending would make it thinner.
+    pub scale: f32,
 }
 
 impl Default for Bone {
     fn default() -> Self {
-        Bone { position: Vec3::ZERO, orientation: Quat::IDENTITY }
+        Bone { position: Vec3::ZERO, orientation: Quat::IDENTITY, scale: 1.0 }
     }
 }
 
@@ -96,6 +123,7 @@ pub struct Skin {
     /// Bones beyond the seam of a closed thread: which element each repeats, and how it is turned from it.
     repeats: Vec<(usize, DQuat)>,
     n_elements: usize,
+    blend: Blend,
     rows: Vec<Row>,
     /// Vertices of a row.
     width: usize,
@@ -215,7 +243,17 @@ impl Skin {
         let order: Vec<usize> = (n + beyond..n + 2 * beyond).chain(0..n + beyond).collect();
 
         let places = places(spec, &outline);
-        let mut skin = Skin { mesh: TriangleMesh::default(), joints: Vec::new(), weights: Vec::new(), bind, repeats, n_elements: n, rows: Vec::new(), width };
+        let mut skin = Skin {
+            mesh: TriangleMesh::default(),
+            joints: Vec::new(),
+            weights: Vec::new(),
+            bind,
+            repeats,
+            n_elements: n,
+            blend: spec.blend,
+            rows: Vec::new(),
+            width,
+        };
         for place in &places {
             let row = match spec.blend {
                 Blend::Smooth => skin.smooth(place, &order, beyond),
@@ -307,17 +345,33 @@ impl Skin {
         let n = self.n_elements;
         assert!(positions.len() == n + 1 && orientations.len() == n, "a thread of {} elements, the skin is of {n}", orientations.len());
         assert_eq!(bones.len(), self.n_bones(), "bones of the skin");
+        let mut kept = self.repeats.first().map_or(1.0, |_| self.seam_area(orientations));
         for e in 0..n {
+            let before = kept;
+            kept = match orientations.get(e + 1) {
+                Some(next) => area_kept(orientations[e].conjugate() * *next),
+                None => self.repeats.first().map_or(1.0, |_| self.seam_area(orientations)),
+            };
+            let scale = match self.blend {
+                Blend::Smooth => (0.5 * (before + kept)).sqrt().recip().min(WIDEST) as f32,
+                Blend::InverseDistance => 1.0,
+            };
             let middle = (positions[e] + positions[e + 1]) * 0.5;
-            bones[e] = Bone { position: middle.as_vec3(), orientation: orientations[e].as_quat() };
+            bones[e] = Bone { position: middle.as_vec3(), orientation: orientations[e].as_quat(), scale };
         }
-        for (bone, (e, turn)) in bones[n..].iter_mut().zip(&self.repeats) {
-            let middle = (positions[*e] + positions[e + 1]) * 0.5;
-            *bone = Bone { position: middle.as_vec3(), orientation: (orientations[*e] * *turn).as_quat() };
+        for (k, (e, turn)) in self.repeats.iter().enumerate() {
+            bones[n + k] = Bone { orientation: (orientations[*e] * *turn).as_quat(), ..bones[*e] };
         }
     }
 
-    /// Positions \[m\] and unit normals of the vertices where the bones are, by linear blending: M = sum of w R, the transposed inverse of M for normals.
+    /// [`area_kept`] at the seam of a closed thread.
+    fn seam_area(&self, orientations: &[DQuat]) -> f64 {
+        let [first, .., last] = orientations else { return 1.0 };
+        // The first repeat is the first element as it goes on from the last.
+        area_kept(last.conjugate() * *first * self.repeats[0].1)
+    }
+
+    /// Positions \[m\] and unit normals of the vertices where the bones are, by linear blending: M = sum of w R S, the transposed inverse of M for normals.
     /// Nothing is allocated.
     ///
     /// # Panics
@@ -335,7 +389,9 @@ impl Skin {
                 if w > 0.0 {
                     let bone = bones[usize::from(row.joints[k])];
                     let r = Mat3::from_quat(bone.orientation);
-                    m += r * w;
+                    m.x_axis += r.x_axis * (w * bone.scale);
+                    m.y_axis += r.y_axis * (w * bone.scale);
+                    m.z_axis += r.z_axis * w;
                     center += (bone.position + r.z_axis * row.offsets[k]) * w;
                 }
             }
@@ -384,6 +440,15 @@ impl Skin {
         }
         row
     }
+}
+
+/// The most that a bone's scale makes up for: it widens the thread across the bend by as much.
+const WIDEST: f64 = 1.25;
+
+/// Part of the area of a cross-section that is left midway between two bones with this turn q from one to the other: the mean (1 + R) / 2 of both
+/// shrinks by w = cos(a / 2) across the axis of the turn and not along it, so that the area across z shrinks by w sqrt(1 - q_z^2).
+fn area_kept(q: DQuat) -> f64 {
+    q.w.abs() * (1.0 - q.z * q.z).max(0.0).sqrt()
 }
 
 impl Outline {

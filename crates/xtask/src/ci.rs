@@ -1,7 +1,7 @@
 //! What the whole check consists of. A step that fails does not stop the others.
 
 use crate::fuzz;
-use crate::program::{self, Profile};
+use crate::program::{self, GlbValidator, Profile};
 use crate::tally::{Tally, cargo, root};
 use crate::viewer;
 use std::path::PathBuf;
@@ -33,6 +33,7 @@ pub fn everything(tally: &mut Tally) {
         tally.run("example of the README", &mut program::example("first_thread"));
     }
     let recorded = scenes(tally, &[]);
+    glb(tally, &recorded);
     same_bits(tally, &recorded);
     fuzz::run(tally, None, FUZZING);
     viewer::check(tally);
@@ -45,8 +46,15 @@ pub fn tests(tally: &mut Tally, args: &[String]) {
     tally.run_tests("cargo test --workspace", command.args(args));
 }
 
-/// Runs scenes with the release build: the named ones, or all but those left out. Names of those that ran, with their recorded inputs.
-pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<(String, PathBuf)> {
+/// What a scene that ran left behind.
+pub struct Recorded {
+    name: String,
+    input: PathBuf,
+    trajectory: PathBuf,
+}
+
+/// Runs scenes with the release build: the named ones, or all but those left out. Those that ran.
+pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<Recorded> {
     let Some(sutura) = program::build(tally, Profile::Release) else { return Vec::new() };
     let all = match sample_names() {
         Ok(all) => all,
@@ -67,7 +75,7 @@ pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<(String, PathBuf)> {
                     &step,
                     result.map(|report| {
                         println!("   {step}: passed, {:.1} s simulated in {:.1} s CPU", report.simulated, report.cpu);
-                        recorded.push((name.clone(), report.input));
+                        recorded.push(Recorded { name: name.clone(), input: report.input, trajectory: report.trajectory });
                     }),
                 );
             }
@@ -76,8 +84,22 @@ pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<(String, PathBuf)> {
     recorded
 }
 
+/// Every scene as GLB has neither an error nor a warning by the validator of Khronos.
+pub fn glb(tally: &mut Tally, recorded: &[Recorded]) {
+    let Some(sutura) = program::build(tally, Profile::Release) else { return };
+    println!();
+    let validator = GlbValidator::fetch();
+    if let Err(why) = &validator {
+        tally.skip("glTF validator of Khronos", why);
+    }
+    for Recorded { name, trajectory, .. } in recorded {
+        let check = |glb: PathBuf| validator.as_ref().map_or(Ok(()), |v| v.check(&glb));
+        tally.count(&format!("GLB of {name}"), sutura.export_glb(trajectory).and_then(check));
+    }
+}
+
 /// Every scene has the same state after every step in the debug build and in one for other features of the processor.
-fn same_bits(tally: &mut Tally, recorded: &[(String, PathBuf)]) {
+fn same_bits(tally: &mut Tally, recorded: &[Recorded]) {
     let (Some(release), Some(debug)) = (program::build(tally, Profile::Release), program::build(tally, Profile::Debug)) else { return };
     println!();
     let count = |tally: &mut Tally, step: String, result: Result<(), String>| {
@@ -86,7 +108,7 @@ fn same_bits(tally: &mut Tally, recorded: &[(String, PathBuf)]) {
         }
         tally.count(&step, result);
     };
-    for (name, input) in recorded {
+    for Recorded { name, input, .. } in recorded {
         count(tally, format!("same bits of {name}, debug build"), debug.replay(input, LONGEST));
         if RUN_AGAIN.contains(&name.as_str()) {
             let again = debug.run_scene(name, &format!("{name}-debug"), LONGEST).and_then(|report| release.compare(input, &report.input));
@@ -98,7 +120,7 @@ fn same_bits(tally: &mut Tally, recorded: &[(String, PathBuf)]) {
         return tally.skip(&step, "this processor is not one of them");
     }
     let Some(recorder) = program::build_for_other_features(tally, &step) else { return };
-    for (name, input) in recorded {
+    for Recorded { name, input, .. } in recorded {
         let result = recorder.record(name, LONGEST).and_then(|other| release.compare(input, &other));
         count(tally, format!("same bits of {name}, {step}"), result);
     }

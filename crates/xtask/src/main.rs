@@ -12,9 +12,9 @@ use std::process::ExitCode;
 use tally::Tally;
 
 const HELP: &str = "\
-cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes, same bits in every build
+cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes and their GLB files, same bits in every build
 cargo xtask test [ARGS]      all tests (`cargo test --workspace`), with a count at the end
-cargo xtask scenes [NAMES]   run sample scenes with the release build; all of them without names
+cargo xtask scenes [NAMES]   run sample scenes with the release build and validate them as GLB; all of them without names
 cargo xtask bench [ARGS]     `sutura bench` with the release build
 cargo xtask fuzz [TARGET] [--minutes M]
                              fuzz one target or all, each for so long (10)
@@ -34,7 +34,10 @@ fn main() -> ExitCode {
         _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
         "ci" => ci::everything(&mut tally),
         "test" => ci::tests(&mut tally, rest),
-        "scenes" => drop(ci::scenes(&mut tally, rest)),
+        "scenes" => {
+            let recorded = ci::scenes(&mut tally, rest);
+            ci::glb(&mut tally, &recorded);
+        }
         "bench" => program::bench(&mut tally, rest),
         "fuzz" => {
             if let Err(problem) = fuzz::command(&mut tally, rest) {

@@ -21,6 +21,8 @@ pub struct Program {
 pub struct Report {
     /// What was done to the world, with the state hash after every step.
     pub input: PathBuf,
+    /// Where everything was, frame by frame.
+    pub trajectory: PathBuf,
     pub simulated: f64,
     pub cpu: f64,
 }
@@ -56,7 +58,7 @@ impl Program {
         let out = target().join("scenes").join(run);
         let file = format!("scenes/{name}.toml");
         let mut command = self.command();
-        command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--no-trajectory", "--record", "--out"]).arg(&out);
+        command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--record", "--out"]).arg(&out);
         // A report of an earlier run must not pass for that of this one.
         let _ = std::fs::remove_file(out.join("report.json"));
         let ended = status_within(&mut command, limit);
@@ -73,6 +75,14 @@ impl Program {
         status_within(self.command().args(["replay", "--quiet"]).arg(input), limit)
     }
 
+    /// Exports a recorded trajectory as GLB beside it.
+    pub fn export_glb(&self, trajectory: &Path) -> Result<PathBuf, String> {
+        let glb = trajectory.with_extension("glb");
+        let _ = std::fs::remove_file(&glb);
+        status_within(self.command().args(["export", "--quiet"]).arg(trajectory).arg("--out").arg(&glb), Duration::from_secs(60))?;
+        Ok(glb)
+    }
+
     /// Compares two recorded inputs and their states.
     pub fn compare(&self, input: &Path, other: &Path) -> Result<(), String> {
         status_within(self.command().args(["replay", "--quiet"]).arg(input).arg("--with").arg(other), Duration::from_secs(60))
@@ -85,6 +95,34 @@ impl Program {
         let _ = std::fs::remove_file(&input);
         status_within(self.command().arg(out).arg(format!("scenes/{name}.toml")).stdout(Stdio::null()), limit)?;
         Ok(input)
+    }
+}
+
+/// The glTF validator of Khronos, run by Node.js.
+pub struct GlbValidator {
+    folder: PathBuf,
+}
+
+impl GlbValidator {
+    /// Fetches it where that was not done yet; an error where it cannot be had.
+    pub fn fetch() -> Result<Self, String> {
+        let validator = GlbValidator { folder: target().join("gltf-validator") };
+        match validator.command().arg("--fetch").status() {
+            Ok(status) if status.success() => Ok(validator),
+            Ok(_) => Err("npm could not fetch it".into()),
+            Err(e) => Err(format!("no Node.js: {e}")),
+        }
+    }
+
+    /// An error when it finds an error or a warning, which it prints.
+    pub fn check(&self, glb: &Path) -> Result<(), String> {
+        status_within(self.command().arg(glb), Duration::from_secs(60))
+    }
+
+    fn command(&self) -> Command {
+        let mut command = Command::new("node");
+        command.current_dir(root()).stdin(Stdio::null()).arg("scripts/validate_glb.mjs").arg(&self.folder);
+        command
     }
 }
 
@@ -120,10 +158,10 @@ fn read(path: &Path) -> Result<(Report, Vec<String>), String> {
     let text = std::fs::read_to_string(path).map_err(|e| problem(&e))?;
     let json: serde_json::Value = serde_json::from_str(&text).map_err(|e| problem(&e))?;
     let number = |key: &str| json[key].as_f64().ok_or_else(|| problem(&format!("no number `{key}`")));
-    let input = path.with_file_name("input.sutura");
+    let (input, trajectory) = (path.with_file_name("input.sutura"), path.with_file_name("trajectory.sutura"));
     let checks = json["checks"].as_array().into_iter().flatten().filter(|c| c["passed"] == false);
     let failed = checks.map(|c| format!("{} is {}, wanted {}", c["name"], c["value"], c["wanted"])).collect();
-    Ok((Report { input, simulated: number("simulated_s")?, cpu: number("cpu_s")? }, failed))
+    Ok((Report { input, trajectory, simulated: number("simulated_s")?, cpu: number("cpu_s")? }, failed))
 }
 
 /// Times the release build.

@@ -1,6 +1,6 @@
 //! A table of positions and frames.
 
-use super::{ExportError, Moment, Output};
+use super::{ExportError, Moment, Output, Writer};
 use crate::trajectory::Header;
 
 /// Rows so far.
@@ -17,7 +17,13 @@ impl Csv {
         csv
     }
 
-    pub fn add(&mut self, header: &Header, moment: &Moment) {
+    fn row(&mut self, cells: [String; 10]) {
+        self.table.write_record(cells).expect("a row in memory, of as many cells as the others");
+    }
+}
+
+impl Writer for Csv {
+    fn add(&mut self, header: &Header, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
         for (thread, strand) in header.threads.iter().zip(&moment.threads) {
             for (i, x) in strand.positions.iter().enumerate() {
                 // The last particle has no element after it.
@@ -27,13 +33,10 @@ impl Csv {
                 self.row([moment.time.to_string(), thread.name.clone(), i.to_string(), x, y, z, a, b, c, d]);
             }
         }
+        Ok(())
     }
 
-    fn row(&mut self, cells: [String; 10]) {
-        self.table.write_record(cells).expect("a row in memory, of as many cells as the others");
-    }
-
-    pub fn finish(self, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
         let bytes = self.table.into_inner().expect("a table in memory");
         out.write(None, &bytes)
     }

@@ -3,7 +3,7 @@
 //! Joints are no chain: all hang from one node at the origin, so that the path of a joint is that of the middle of its element.
 
 use super::texture::braid;
-use super::{ExportError, Looks, Moment, Output, THREAD_COLORS};
+use super::{ExportError, Looks, Moment, Output, THREAD_COLORS, Writer, fitted};
 use crate::trajectory::{Header, ShapeOutline};
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::animation::{Channel, Interpolation, Property, Sampler, Target};
@@ -16,6 +16,7 @@ use gltf::json::validation::USize64;
 use gltf::json::{Accessor, Animation, Asset, Buffer, Image, Index, Material, Mesh, Node, Root, Scene, Skin, Texture, texture};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use sutura::glam::DVec3;
 use sutura::skin::{Bone, TriangleMesh};
 
 /// Paths of all nodes that may move.
@@ -23,6 +24,7 @@ pub struct Glb {
     looks: Looks,
     threads: Vec<String>,
     shapes: Vec<(String, bool)>,
+    up: DVec3,
     times: Vec<f64>,
     /// Of each bone of each thread, then of each shape.
     paths: Vec<Path>,
@@ -32,7 +34,12 @@ pub struct Glb {
 struct Path {
     positions: Vec<[f32; 3]>,
     turns: Vec<[f32; 4]>,
+    /// Of a bone.
+    scales: Vec<[f32; 3]>,
 }
+
+/// A scale nearer to 1 than this is not seen.
+const SEEN: f32 = 1e-3;
 
 impl Path {
     /// Adds a place; of the two quaternions of a rotation the one nearer to the last, so that between them it takes the short way.
@@ -40,6 +47,10 @@ impl Path {
         let against = self.turns.last().is_some_and(|last| last.iter().zip(turn).map(|(a, b)| a * b).sum::<f32>() < 0.0);
         self.positions.push(position);
         self.turns.push(if against { turn.map(|v| -v) } else { turn });
+    }
+
+    fn is_scaled(&self) -> bool {
+        self.scales.iter().any(|s| (s[0] - 1.0).abs() > SEEN)
     }
 }
 
@@ -50,20 +61,49 @@ struct Document {
 }
 
 impl Glb {
-    pub fn new(looks: Looks, header: &Header) -> Self {
+    pub fn new(looks: Looks, header: &Header, up: DVec3) -> Self {
         let n: usize = looks.skins.iter().map(sutura::skin::Skin::n_bones).sum::<usize>() + looks.shapes.len();
         // What has no inside is seen from both sides.
         let open = |o: &ShapeOutline| matches!(o, ShapeOutline::Plane | ShapeOutline::Mesh { .. });
         Glb {
             threads: header.threads.iter().map(|t| t.name.clone()).collect(),
             shapes: header.shapes.iter().map(|s| (s.name.clone(), open(&s.outline))).collect(),
+            up,
             times: Vec::new(),
             paths: vec![Path::default(); n],
             looks,
         }
     }
 
-    pub fn add(&mut self, moment: &Moment) {
+    /// One animation from time 0 on; what stays where it is has no channel.
+    fn animate(&self, doc: &mut Document, nodes: &[Index<Node>]) {
+        let first = self.times[0];
+        let times: Vec<[f32; 1]> = self.times.iter().map(|t| [(t - first) as f32]).collect();
+        let mut animation = Animation { extensions: None, extras: Default::default(), channels: Vec::new(), name: Some("run".into()), samplers: Vec::new() };
+        let mut input = None;
+        for (node, path) in nodes.iter().zip(&self.paths) {
+            let moves =
+                path.positions.iter().any(|x| *x != path.positions[0]).then(|| (Property::Translation, doc.accessor(Type::Vec3, None, &path.positions)));
+            let turns = path.turns.iter().any(|q| *q != path.turns[0]).then(|| (Property::Rotation, doc.accessor(Type::Vec4, None, &path.turns)));
+            let widens = path.is_scaled().then(|| (Property::Scale, doc.accessor(Type::Vec3, None, &path.scales)));
+            for (property, output) in moves.into_iter().chain(turns).chain(widens) {
+                let input = *input.get_or_insert_with(|| doc.bounded(Type::Scalar, None, &times));
+                let sampler = Index::new(animation.samplers.len() as u32);
+                let interpolation = Valid(Interpolation::Linear);
+                animation.samplers.push(Sampler { extensions: None, extras: Default::default(), input, interpolation, output });
+                let target = Target { extensions: None, extras: Default::default(), node: *node, path: Valid(property) };
+                animation.channels.push(Channel { sampler, target, extensions: None, extras: Default::default() });
+            }
+        }
+        if !animation.channels.is_empty() {
+            doc.root.push(animation);
+        }
+    }
+}
+
+impl Writer for Glb {
+    fn add(&mut self, header: &Header, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
+        let moment = fitted(header, moment);
         self.times.push(moment.time);
         let mut paths = self.paths.iter_mut();
         for (skin, strand) in self.looks.skins.iter().zip(&moment.threads) {
@@ -71,17 +111,20 @@ impl Glb {
             skin.bones_at(&strand.positions, &strand.orientations, &mut bones);
             for (bone, path) in bones.iter().zip(&mut paths) {
                 path.push(bone.position.to_array(), bone.orientation.normalize().to_array());
+                path.scales.push([bone.scale, bone.scale, 1.0]);
             }
         }
         for (pose, path) in moment.shapes.iter().zip(&mut paths) {
             path.push(pose.position.as_vec3().to_array(), pose.orientation.as_quat().normalize().to_array());
         }
+        Ok(())
     }
 
-    pub fn finish(self, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
         let mut doc = Document { root: Root::default(), bytes: Vec::new() };
         doc.root.asset = Asset { generator: Some(format!("Sutura {}", env!("CARGO_PKG_VERSION"))), ..Asset::default() };
-        let mut scene_nodes = Vec::new();
+        // Skinned meshes go by their joints alone and stand beside what is turned.
+        let (mut scene_nodes, mut turned) = (Vec::new(), Vec::new());
         let mut moving: Vec<Index<Node>> = Vec::new();
         let mut paths = self.paths.iter();
         let texture = (!self.threads.is_empty()).then(|| doc.braid());
@@ -106,7 +149,8 @@ impl Glb {
             let more = [(Semantic::Joints(0), joints_accessor), (Semantic::Weights(0), weights)];
             let mesh = doc.mesh(name, skin.mesh(), material, &more);
             let tube = doc.root.push(Node { name: Some(format!("{name}.skin")), mesh: Some(mesh), skin: Some(skin_index), ..Node::default() });
-            scene_nodes.extend([parent, tube]);
+            turned.push(parent);
+            scene_nodes.push(tube);
         }
         for ((mesh, (name, open)), path) in self.looks.shapes.iter().zip(&self.shapes).zip(&mut paths) {
             let (color, metallic, roughness) = if *open { ([70, 120, 95], 0.0, 0.9) } else { ([196, 199, 205], 0.9, 0.35) };
@@ -114,36 +158,19 @@ impl Glb {
             let mesh = doc.mesh(name, mesh, material, &[]);
             let node = doc.node(name, path, Some(mesh));
             moving.push(node);
-            scene_nodes.push(node);
+            turned.push(node);
         }
         self.animate(&mut doc, &moving);
+        if self.up == DVec3::Y || turned.is_empty() {
+            scene_nodes.extend(turned);
+        } else {
+            let rotation = sutura::math::rotation_arc(self.up, DVec3::Y).as_quat().normalize();
+            let rotation = Some(UnitQuaternion(rotation.to_array()));
+            scene_nodes.push(doc.root.push(Node { name: Some("upright".into()), children: Some(turned), rotation, ..Node::default() }));
+        }
         let scene = doc.root.push(Scene { extensions: None, extras: Default::default(), name: None, nodes: scene_nodes });
         doc.root.scene = Some(scene);
-        out.write(None, &doc.to_glb()?)
-    }
-
-    /// One animation from time 0 on; what stays where it is has no channel.
-    fn animate(&self, doc: &mut Document, nodes: &[Index<Node>]) {
-        let first = self.times[0];
-        let times: Vec<[f32; 1]> = self.times.iter().map(|t| [(t - first) as f32]).collect();
-        let mut animation = Animation { extensions: None, extras: Default::default(), channels: Vec::new(), name: Some("run".into()), samplers: Vec::new() };
-        let mut input = None;
-        for (node, path) in nodes.iter().zip(&self.paths) {
-            let moves =
-                path.positions.iter().any(|x| *x != path.positions[0]).then(|| (Property::Translation, doc.accessor(Type::Vec3, None, &path.positions)));
-            let turns = path.turns.iter().any(|q| *q != path.turns[0]).then(|| (Property::Rotation, doc.accessor(Type::Vec4, None, &path.turns)));
-            for (property, output) in moves.into_iter().chain(turns) {
-                let input = *input.get_or_insert_with(|| doc.bounded(Type::Scalar, None, &times));
-                let sampler = Index::new(animation.samplers.len() as u32);
-                let interpolation = Valid(Interpolation::Linear);
-                animation.samplers.push(Sampler { extensions: None, extras: Default::default(), input, interpolation, output });
-                let target = Target { extensions: None, extras: Default::default(), node: *node, path: Valid(property) };
-                animation.channels.push(Channel { sampler, target, extensions: None, extras: Default::default() });
-            }
-        }
-        if !animation.channels.is_empty() {
-            doc.root.push(animation);
-        }
+        out.write(None, &doc.into_glb()?)
     }
 }
 
@@ -231,7 +258,8 @@ impl Document {
     /// A node where a path begins.
     fn node(&mut self, name: &str, path: &Path, mesh: Option<Index<Mesh>>) -> Index<Node> {
         let (translation, rotation) = (path.positions.first().copied(), path.turns.first().map(|q| UnitQuaternion(*q)));
-        self.root.push(Node { name: Some(name.into()), mesh, translation, rotation, ..Node::default() })
+        let scale = path.scales.first().copied().filter(|_| path.is_scaled());
+        self.root.push(Node { name: Some(name.into()), mesh, translation, rotation, scale, ..Node::default() })
     }
 
     fn braid(&mut self) -> Index<Texture> {
@@ -269,7 +297,7 @@ impl Document {
         })
     }
 
-    fn to_glb(mut self) -> Result<Vec<u8>, ExportError> {
+    fn into_glb(mut self) -> Result<Vec<u8>, ExportError> {
         let length = USize64::from(self.bytes.len());
         self.root.push(Buffer { byte_length: length, name: None, uri: None, extensions: None, extras: Default::default() });
         let json = self.root.to_vec().expect("a document in memory, with numbers that are finite");

@@ -1,6 +1,6 @@
 //! Wavefront OBJ: an object a thread and shape, with texture coordinates and normals.
 
-use super::{ExportError, Looks, Moment, Output};
+use super::{ExportError, Looks, Moment, Output, Writer, fitted};
 use crate::trajectory::Header;
 use std::fmt::Write as _;
 use sutura::skin::{Bone, TriangleMesh};
@@ -19,17 +19,6 @@ impl Obj {
         // A name ends at a blank.
         let names = names.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_")).collect();
         Obj { looks, names, last: None, number: 0 }
-    }
-
-    pub fn add(&mut self, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
-        let text = self.text(moment);
-        if out.is_one_file() {
-            self.last = Some(text);
-            return Ok(());
-        }
-        let name = format!("frame_{:05}.obj", self.number);
-        self.number += 1;
-        out.write(Some(&name), text.as_bytes())
     }
 
     fn text(&self, moment: &Moment) -> String {
@@ -73,8 +62,21 @@ impl Obj {
         }
         text
     }
+}
 
-    pub fn finish(self, out: &mut Output) -> Result<(), ExportError> {
+impl Writer for Obj {
+    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
+        let text = self.text(&fitted(header, moment));
+        if out.is_one_file() {
+            self.last = Some(text);
+            return Ok(());
+        }
+        let name = format!("frame_{:05}.obj", self.number);
+        self.number += 1;
+        out.write(Some(&name), text.as_bytes())
+    }
+
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
         self.last.map_or(Ok(()), |text| out.write(None, text.as_bytes()))
     }
 }

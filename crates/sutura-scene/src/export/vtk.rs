@@ -3,7 +3,7 @@
 //! Names and fields are constants, so that nothing needs escaping, and the format is a dozen tags: the crates for VTK bring a parser of the old
 //! format and three compressors.
 
-use super::{ExportError, Looks, Moment, Output, Strand};
+use super::{ExportError, Looks, Moment, Output, Strand, Writer};
 use crate::trajectory::{Header, Thread, ThreadLook};
 use base64::Engine as _;
 use std::fmt::Write as _;
@@ -41,7 +41,25 @@ impl Vtk {
         Vtk { looks, threads: Vec::new(), shapes: Vec::new(), placed: None }
     }
 
-    pub fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
+    fn surfaces(&self, moment: &Moment) -> PolyData {
+        let mut data = PolyData { points: Vec::new(), cells: Vec::new(), kind: "Polys", point_fields: Vec::new(), cell_fields: Vec::new() };
+        let (mut normals, mut which) = (Vec::new(), Vec::new());
+        for (k, (mesh, pose)) in self.looks.shapes.iter().zip(&moment.shapes).enumerate() {
+            let first = (data.points.len() / 3) as i32;
+            let mesh = mesh.placed(pose);
+            data.points.extend(mesh.positions.iter().flatten());
+            normals.extend(mesh.normals.iter().flatten());
+            which.extend(mesh.triangles.iter().map(|_| k as f32));
+            data.cells.extend(mesh.triangles.iter().map(|t| t.map(|i| first + i as i32).to_vec()));
+        }
+        data.point_fields.push(Field { name: "Normals", components: 3, values: normals });
+        data.cell_fields.push(Field { name: "shape", components: 1, values: which });
+        data
+    }
+}
+
+impl Writer for Vtk {
+    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
         let number = self.threads.len();
         let name = format!("threads_{number:05}.vtp");
         out.write(Some(&name), threads(header, moment).text().as_bytes())?;
@@ -61,7 +79,7 @@ impl Vtk {
         Ok(())
     }
 
-    pub fn finish(self, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
         for (name, files) in [("threads.pvd", &self.threads), ("shapes.pvd", &self.shapes)] {
             if files.is_empty() {
                 continue;
@@ -74,22 +92,6 @@ impl Vtk {
             out.write(Some(name), text.as_bytes())?;
         }
         Ok(())
-    }
-
-    fn surfaces(&self, moment: &Moment) -> PolyData {
-        let mut data = PolyData { points: Vec::new(), cells: Vec::new(), kind: "Polys", point_fields: Vec::new(), cell_fields: Vec::new() };
-        let (mut normals, mut which) = (Vec::new(), Vec::new());
-        for (k, (mesh, pose)) in self.looks.shapes.iter().zip(&moment.shapes).enumerate() {
-            let first = (data.points.len() / 3) as i32;
-            let mesh = mesh.placed(pose);
-            data.points.extend(mesh.positions.iter().flatten());
-            normals.extend(mesh.normals.iter().flatten());
-            which.extend(mesh.triangles.iter().map(|_| k as f32));
-            data.cells.extend(mesh.triangles.iter().map(|t| t.map(|i| first + i as i32).to_vec()));
-        }
-        data.point_fields.push(Field { name: "Normals", components: 3, values: normals });
-        data.cell_fields.push(Field { name: "shape", components: 1, values: which });
-        data
     }
 }
 

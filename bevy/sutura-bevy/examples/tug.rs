@@ -2,7 +2,7 @@
 //! over to their side wins. Only the plugin's public interface is used.
 
 use bevy::prelude::*;
-use sutura_bevy::sutura::glam::DVec3;
+use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::{Friction, Geometry, Hold, Material, Place, Pose, RodSpec, ShapeSpec};
 use sutura_bevy::{Body, Grip, PhysicsFrame, PhysicsSet, Space, Sutura, SuturaPlugin, Thread};
 
@@ -43,7 +43,7 @@ fn set_up(mut commands: Commands, mut sutura: ResMut<Sutura>, space: Res<Space>)
     let material = Material { bend_damping: 0.01, bend_scale: 0.05, ..Material::elastic(2e9, 1150.0) };
     let thread = commands.spawn(Thread::new(RodSpec::new(points, 0.15e-3, material))).id();
     // The axis of a cylinder is its z.
-    let lying = sutura_bevy::sutura::glam::DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let lying = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let post = Geometry::Cylinder { radius: POST, half_length: 0.01 };
     commands.spawn(Body::new(ShapeSpec::fixed(post, Pose::new(DVec3::ZERO, lying))));
     commands.spawn((Grip::new(thread, Place::Start, Hold::Pin), Player(KeyCode::KeyA, KeyCode::KeyD)));
@@ -69,6 +69,12 @@ fn pull(keys: Res<ButtonInput<KeyCode>>, mut grips: Query<(&mut Grip, &Player)>,
 fn score(grips: Query<&Grip>, mut windows: Query<&mut Window>) {
     let mut ends = grips.iter().map(|g| (g.force(), g.pose().position.z));
     let (Some((left, a)), Some((right, b)), Ok(mut window)) = (ends.next(), ends.next(), windows.single_mut()) else { return };
-    let ahead = if (a - b).abs() < 2.0 * POST { "even" } else if a < b { "left leads" } else { "right leads" };
+    let ahead = if (a - b).abs() < 2.0 * POST {
+        "even"
+    } else if a < b {
+        "left leads"
+    } else {
+        "right leads"
+    };
     window.title = format!("tug: left {left:.2} N, right {right:.2} N, {ahead}");
 }

@@ -97,7 +97,10 @@ pub(crate) fn build(app: &mut App) {
     app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0));
     let renders = resource_exists::<Assets<StandardMaterial>>;
     app.add_systems(Startup, make_materials.run_if(renders));
-    app.add_systems(PostUpdate, (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids).chain().before(TransformSystems::Propagate).run_if(renders));
+    app.add_systems(
+        PostUpdate,
+        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids).chain().before(TransformSystems::Propagate).run_if(renders),
+    );
 }
 
 fn make_materials(mut commands: Commands, mut images: ResMut<Assets<Image>>, mut materials: ResMut<Assets<StandardMaterial>>) {
@@ -115,7 +118,8 @@ pub(crate) fn show_threads(
         let Some(rod) = thread.handle().and_then(|h| sutura.world().rod(h).ok()) else { continue };
         let (Some(mut strand), Some(mut states)) = (strand, states) else {
             let (positions, orientations) = (rod.positions().to_vec(), rod.orientations().to_vec());
-            let strand = Strand { skin: SkinSpec::of(&rod), positions, orientations, tensions: Vec::new(), look: thread.look, stoutness: 1.0, tension_scale: None };
+            let strand =
+                Strand { skin: SkinSpec::of(&rod), positions, orientations, tensions: Vec::new(), look: thread.look, stoutness: 1.0, tension_scale: None };
             commands.entity(entity).insert((strand, States { frames: u64::MAX, ..States::default() }));
             continue;
         };
@@ -203,10 +207,8 @@ fn mesh_strands(
         let (mut parts, mut most) = (Vec::new(), Vec::new());
         for part in tube::parts(&skin, MOST_BONES) {
             let bind = part.bones.iter().map(|b| Mat4::from_translation(Vec3::NEG_Z * skin.bind()[usize::from(*b)] as f32 * space.scale));
-            let skinned = SkinnedMesh {
-                inverse_bindposes: poses.add(bind.collect::<Vec<_>>()),
-                joints: part.bones.iter().map(|b| bones[usize::from(*b)]).collect(),
-            };
+            let skinned =
+                SkinnedMesh { inverse_bindposes: poses.add(bind.collect::<Vec<_>>()), joints: part.bones.iter().map(|b| bones[usize::from(*b)]).collect() };
             let strongest = |v: &u32| {
                 let (joints, weights) = (skin.joints()[*v as usize], skin.weights()[*v as usize]);
                 (0..4).max_by(|a, b| weights[*a].total_cmp(&weights[*b])).map_or(0, |k| joints[k])
@@ -253,7 +255,7 @@ fn pose_bones(space: Res<Space>, strands: Query<(&Strand, &Drawn), Or<(Changed<S
         for (entity, bone) in drawn.bones.iter().zip(&posed) {
             let Ok(mut place) = bones.get_mut(*entity) else { continue };
             let (x, q) = (Vec3::from_array(bone.position.to_array()), Quat::from_array(bone.orientation.to_array()));
-            *place = GlobalTransform::from(Transform { translation: space.rotation * (x * space.scale), rotation: space.rotation * q, scale: Vec3::ONE });
+            *place = GlobalTransform::from(Transform { translation: space.rotation * (x * space.scale), rotation: space.rotation * q, scale: Vec3::new(bone.scale, bone.scale, 1.0) });
         }
     }
 }

@@ -133,7 +133,7 @@ pub(crate) fn grab(
     if fresh && hand.held.is_none() {
         let (origin, direction) = (space.place_back(ray.origin), space.direction_back(*ray.direction));
         let thread = nearest_thread(&sutura, threads.iter(), origin, direction, f64::from(pointer.reach));
-        let body = nearest_body(&sutura, bodies.iter().map(|(e, b)| (e, b)), origin, direction);
+        let body = nearest_body(&sutura, bodies.iter(), origin, direction);
         let t = match (thread, body) {
             // A thread behind a body is hidden.
             (Some(thread), body) if body.is_none_or(|b| thread.t <= b.1 + thread.radius) => {

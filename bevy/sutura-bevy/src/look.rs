@@ -68,12 +68,7 @@ impl Materials {
             reflectance: 0.25,
             ..default()
         });
-        let steel = materials.add(StandardMaterial {
-            base_color: Color::srgb(0.80, 0.81, 0.83),
-            metallic: 1.0,
-            perceptual_roughness: 0.22,
-            ..default()
-        });
+        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.80, 0.81, 0.83), metallic: 1.0, perceptual_roughness: 0.22, ..default() });
         Materials { steel, drape }
     }
 }
@@ -108,7 +103,8 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
     let cell = |u: f32, v: f32| {
         let (p, q) = (CARRIERS * (u + v), CARRIERS * (u - v));
         let first = (p.floor() + q.floor()).rem_euclid(2.0) < 0.5;
-        let (across, along, number) = if first { (p.rem_euclid(1.0), q.rem_euclid(1.0), p.floor()) } else { (q.rem_euclid(1.0), p.rem_euclid(1.0), q.floor() + 1000.0 * CARRIERS) };
+        let (across, along, number) =
+            if first { (p.rem_euclid(1.0), q.rem_euclid(1.0), p.floor()) } else { (q.rem_euclid(1.0), p.rem_euclid(1.0), q.floor() + 1000.0 * CARRIERS) };
         (across, along, number.rem_euclid(CARRIERS) < 0.5 && first)
     };
     let height = |u: f32, v: f32| {
@@ -151,10 +147,15 @@ fn drape() -> (Image, Image) {
 /// The light of an operating theater from all around: lamps above, dim walls. Diffuse and specular cube maps.
 pub fn surroundings() -> (Image, Image) {
     // Lamps: direction, cosine of their half angle, brightness and warmth.
-    let lamps = [(Vec3::new(0.3, 1.0, 0.35), 0.90, 1.0), (Vec3::new(-0.9, 0.55, 0.2), 0.93, 0.75), (Vec3::new(0.75, 0.35, -0.7), 0.95, 0.6), (Vec3::new(-0.1, 0.5, 1.0), 0.965, 0.5)];
+    let lamps = [
+        (Vec3::new(0.3, 1.0, 0.35), 0.90, 1.0),
+        (Vec3::new(-0.9, 0.55, 0.2), 0.93, 0.75),
+        (Vec3::new(0.75, 0.35, -0.7), 0.95, 0.6),
+        (Vec3::new(-0.1, 0.5, 1.0), 0.965, 0.5),
+    ];
     let light = |d: Vec3, blur: f32| {
-        let sky = 0.12 + 0.20 * smooth(-0.2 - blur, 1.0, d.y);
-        let ground = Vec3::new(0.035, 0.075, 0.06) * smooth(0.15 + blur, -0.35 - blur, d.y);
+        let sky = 0.20 + 0.22 * smooth(-0.2 - blur, 1.0, d.y);
+        let ground = Vec3::new(0.10, 0.17, 0.155) * smooth(0.15 + blur, -0.35 - blur, d.y);
         let mut sum = Vec3::new(0.93, 0.98, 1.0) * sky * smooth(-0.45 - blur, 0.1 + blur, d.y) + ground;
         for (to, edge, bright) in lamps {
             let c = d.dot(to.normalize());
@@ -165,8 +166,8 @@ pub fn surroundings() -> (Image, Image) {
         // Long lamps by the walls, which metal shows as streaks.
         for (x, z) in [(0.8, 0.6), (-0.95, 0.3), (0.2, -0.98)] {
             let side = Vec2::new(d.x, d.z).try_normalize().map_or(0.0, |s| s.dot(Vec2::new(x, z)));
-            let level = smooth(-0.25 - blur, 0.1, d.y) * smooth(0.95 + blur, 0.6, d.y);
-            sum += Vec3::new(0.95, 0.98, 1.0) * (0.5 * level * smooth(0.93 - 0.9 * blur, 0.985, side) / (1.0 + 5.0 * blur));
+            let level = smooth(-0.95 - blur, -0.5, d.y) * smooth(0.95 + blur, 0.6, d.y);
+            sum += Vec3::new(0.95, 0.98, 1.0) * (0.6 * level * smooth(0.88 - 0.9 * blur, 0.97, side) / (1.0 + 5.0 * blur));
         }
         sum
     };

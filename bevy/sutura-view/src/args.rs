@@ -7,11 +7,14 @@ use std::path::PathBuf;
 ///
 /// In the window: drag threads and bodies with the left mouse button, turn the view with the right one, F1 for the keys.
 #[derive(Parser, Debug, Clone, Default)]
-#[command(version, after_help = "\
+#[command(
+    version,
+    after_help = "\
 Examples:
   sutura-view square_knot
   sutura-view out/square_knot/trajectory.sutura
-  sutura-view --headless --screenshot out.png --at 2.5 --size 1280x720 capstan")]
+  sutura-view --headless --screenshot out.png --at 2.5 --size 1280x720 capstan"
+)]
 pub struct Args {
     /// A scene file, a recorded trajectory, or the name of a sample scene.
     #[arg(default_value = "square_knot")]
@@ -40,6 +43,9 @@ pub struct Args {
     /// Closeness of the view: 2 shows things twice as large.
     #[arg(long, default_value_t = 1.0)]
     pub zoom: f64,
+    /// Point in the middle of the view [m].
+    #[arg(long, value_parser = point, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "headless")]
+    pub look_at: Option<[f64; 3]>,
     /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.
     #[arg(long, default_value_t = 2.5, value_name = "PIXELS")]
     pub least_width: f32,
@@ -55,6 +61,11 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once('x').ok_or("WIDTHxHEIGHT, such as 1280x720")?;
     let one = |s: &str| s.parse::<u32>().ok().filter(|v| (16..=8192).contains(v)).ok_or("16 to 8192 pixels a side");
     Ok((one(w)?, one(h)?))
+}
+
+fn point(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|s| s.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    numbers.and_then(|n| n.try_into().ok()).ok_or("three coordinates in meters, such as 0,0.01,0".into())
 }
 
 fn range(text: &str) -> Result<(f64, f64), String> {

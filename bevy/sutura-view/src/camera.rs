@@ -1,10 +1,10 @@
 //! A camera that turns about a point.
 
 use bevy::camera::Hdr;
+use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::light::EnvironmentMapLight;
 use bevy::pbr::{DistanceFog, FogFalloff};
-use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use sutura_bevy::{Hand, Pointer, PointerCamera, look};
 
@@ -23,6 +23,8 @@ pub struct Orbit {
     /// Direction from the target to the eye, and up in the picture.
     direction: Vec3,
     up: Vec3,
+    /// Distance from which all of the scene is seen.
+    reach: f32,
     home: (Vec3, f32, Vec3, Vec3),
 }
 
@@ -36,7 +38,7 @@ impl Orbit {
     fn new(target: Vec3, distance: f32, direction: Vec3, up: Vec3) -> Self {
         let direction = direction.try_normalize().unwrap_or(Vec3::Z);
         let up = if up.cross(direction).length() > 0.05 { up.normalize() } else { direction.any_orthonormal_vector() };
-        Orbit { target, distance, direction, up, home: (target, distance, direction, up) }
+        Orbit { target, distance, direction, up, reach: distance, home: (target, distance, direction, up) }
     }
 
     /// Looks from `from` (a direction from the point to the eye) at the points, all of them, or at a point with a width.
@@ -60,7 +62,9 @@ impl Orbit {
                 };
                 1.12 * points.iter().map(need).fold(0.5, f32::max)
             }
-        } / zoom.max(1e-3);
+        };
+        orbit.reach = orbit.distance;
+        orbit.distance /= zoom.max(1e-3);
         orbit.home = (orbit.target, orbit.distance, orbit.direction, orbit.up);
         orbit
     }
@@ -111,6 +115,10 @@ impl Orbit {
     pub fn pixels(&self, length: f32, height: u32) -> f32 {
         length * height as f32 / (2.0 * self.distance * (0.5 * FIELD).tan())
     }
+    /// How far away all of the scene ends.
+    pub fn far(&self) -> f32 {
+        2.2 * self.distance.max(self.reach)
+    }
     /// Depths between which things are drawn.
     pub fn depths(&self) -> (f32, f32) {
         (0.02 * self.distance, 30.0 * self.distance + 200.0)
@@ -152,7 +160,7 @@ fn projection(orbit: &Orbit) -> PerspectiveProjection {
 
 /// The table ends in the dark.
 fn fog(orbit: &Orbit) -> DistanceFog {
-    DistanceFog { color: BACKGROUND, falloff: FogFalloff::Linear { start: 1.35 * orbit.distance, end: 3.2 * orbit.distance }, ..default() }
+    DistanceFog { color: BACKGROUND, falloff: FogFalloff::Linear { start: 0.62 * orbit.far(), end: 1.45 * orbit.far() }, ..default() }
 }
 
 /// Puts the camera where it is to be.

@@ -8,8 +8,8 @@ use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy::window::{FileDragAndDrop, PrimaryWindow};
 use std::path::PathBuf;
-use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura;
+use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::{Hold, Place, Pose};
 use sutura_bevy::{Grip, Live, PhysicsClock, Space, Strand, Sutura, Thread};
 use sutura_scene::export::{Exporter, Format, Moment, Options};
@@ -266,8 +266,7 @@ fn take(world: &mut World, side: usize) {
         world.despawn(grip);
         return;
     }
-    let mut threads: Vec<(usize, Entity)> =
-        world.query_filtered::<(Entity, &Prop), With<Thread>>().iter(world).map(|(e, p)| (p.0, e)).collect();
+    let mut threads: Vec<(usize, Entity)> = world.query_filtered::<(Entity, &Prop), With<Thread>>().iter(world).map(|(e, p)| (p.0, e)).collect();
     threads.sort_unstable();
     let chosen = if side == 0 { threads.first() } else { threads.last() };
     let Some((_, thread)) = chosen.copied() else {

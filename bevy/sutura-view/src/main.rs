@@ -47,14 +47,14 @@ fn draw(args: &Args) -> anyhow::Result<()> {
         for k in 0..=n {
             studio.go(f64::from(k) * args.every);
             if k == 0 {
-                studio.frame(args.zoom);
+                studio.frame(args.zoom, args.look_at);
             }
             put(&mut studio, &folder.join(format!("{k:05}.png")))?;
         }
     }
     if let Some(path) = &args.screenshot {
         studio.go(args.at);
-        studio.frame(args.zoom);
+        studio.frame(args.zoom, args.look_at);
         put(&mut studio, path)?;
     }
     Ok(())

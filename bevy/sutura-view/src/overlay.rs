@@ -40,7 +40,8 @@ pub fn draw(
             for (e, q) in strand.orientations.iter().enumerate() {
                 let middle = (strand.positions[e] + strand.positions[e + 1]) * 0.5;
                 let long = 3.5 * strand.skin.radius;
-                for (axis, color) in [(DVec3::X, Color::srgb(1.0, 0.25, 0.2)), (DVec3::Y, Color::srgb(0.3, 1.0, 0.3)), (DVec3::Z, Color::srgb(0.35, 0.55, 1.0))] {
+                for (axis, color) in [(DVec3::X, Color::srgb(1.0, 0.25, 0.2)), (DVec3::Y, Color::srgb(0.3, 1.0, 0.3)), (DVec3::Z, Color::srgb(0.35, 0.55, 1.0))]
+                {
                     gizmos.line(space.place(middle), space.place(middle + *q * axis * long), color);
                 }
             }

@@ -56,7 +56,14 @@ pub struct Knots {
 }
 
 /// Recognizes them.
-pub fn recognize_knots(mut knots: ResMut<Knots>, viewer: Res<Viewer>, time: Res<Time<Real>>, sutura: Res<Sutura>, strands: Query<(&Prop, &Strand)>, stage: Res<Stage>) {
+pub fn recognize_knots(
+    mut knots: ResMut<Knots>,
+    viewer: Res<Viewer>,
+    time: Res<Time<Real>>,
+    sutura: Res<Sutura>,
+    strands: Query<(&Prop, &Strand)>,
+    stage: Res<Stage>,
+) {
     if !viewer.knot || time.elapsed_secs_f64() < knots.at + 0.4 {
         return;
     }
@@ -111,7 +118,13 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
         });
         let running = world.resource::<PhysicsClock>().running;
         ui.horizontal(|ui| {
-            for (label, action) in [("⏮", Action::First), (if running { "⏸" } else { "▶" }, Action::PlayPause), ("⏭", Action::Step), ("⏺ now", Action::Latest), ("↺", Action::Reset)] {
+            for (label, action) in [
+                ("⏮", Action::First),
+                (if running { "⏸" } else { "▶" }, Action::PlayPause),
+                ("⏭", Action::Step),
+                ("⏺ now", Action::Latest),
+                ("↺", Action::Reset),
+            ] {
                 let key = KEYS.iter().find(|k| k.3 == action).map_or("", |k| k.1);
                 if ui.button(label).on_hover_text(key).clicked() {
                     world.resource_mut::<Viewer>().wanted.push(action);
@@ -278,7 +291,13 @@ fn material_ui(ui: &mut Ui, world: &World) {
                 row("radius", format!("{:.4} mm", 1e3 * rod.radius()));
                 row("length", format!("{:.1} mm, {} elements", 1e3 * rod.rest_length(), rod.n_elements()));
                 row("Young's modulus", format!("{:.3} GPa", 1e-9 * m.young_modulus));
-                row("shear", match m.shear { Shear::Poisson(nu) => format!("Poisson's ratio {nu}"), Shear::Modulus(g) => format!("{:.3} GPa", 1e-9 * g) });
+                row(
+                    "shear",
+                    match m.shear {
+                        Shear::Poisson(nu) => format!("Poisson's ratio {nu}"),
+                        Shear::Modulus(g) => format!("{:.3} GPa", 1e-9 * g),
+                    },
+                );
                 row("density", format!("{} kg/m³", m.density));
                 row("bending scale", format!("{}", m.bend_scale));
                 row("bending damping", format!("{} s", m.bend_damping));
@@ -350,7 +369,13 @@ fn labels(world: &mut World, context: &egui::Context) {
     if world.resource::<Viewer>().knot {
         let names = &world.resource::<Knots>().names;
         let text = names.iter().filter(|n| !n.is_empty()).cloned().collect::<Vec<_>>().join(", ");
-        painter.text(screen.center_bottom() - egui::vec2(0.0, 14.0), egui::Align2::CENTER_BOTTOM, text, egui::FontId::proportional(18.0), Color32::from_gray(225));
+        painter.text(
+            screen.center_bottom() - egui::vec2(0.0, 14.0),
+            egui::Align2::CENTER_BOTTOM,
+            text,
+            egui::FontId::proportional(18.0),
+            Color32::from_gray(225),
+        );
     }
     let mut marks: Vec<(Vec3, f64)> = Vec::new();
     let space = *world.resource::<Space>();

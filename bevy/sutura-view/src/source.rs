@@ -2,8 +2,8 @@
 
 use std::path::Path;
 use sutura_bevy::Simulation;
-use sutura_bevy::sutura::input::{Recorder, Recording};
 use sutura_bevy::sutura::glam::DVec3;
+use sutura_bevy::sutura::input::{Recorder, Recording};
 use sutura_bevy::sutura::skin::SkinSpec;
 use sutura_bevy::sutura::{Incident, Profile, World};
 use sutura_scene::{Runner, Scene, Thread, Trajectory, samples};
@@ -68,16 +68,10 @@ pub fn skin(thread: &Thread, positions: &[[f32; 3]]) -> SkinSpec {
     // Recordings of earlier versions have no rest lengths; a thread whose ends meet is taken for a closed one.
     let lengths = || positions.windows(2).map(|w| place(w[0]).distance(place(w[1])).max(1e-9)).collect();
     match &thread.look {
-        Some(look) => SkinSpec {
-            section: look.section.into(),
-            size: Profile(look.size.clone()),
-            seam: look.seam,
-            ..SkinSpec::new(look.lengths.clone(), thread.radius)
-        },
-        None => SkinSpec {
-            seam: (positions.len() > 3 && positions.first() == positions.last()).then_some(0.0),
-            ..SkinSpec::new(lengths(), thread.radius)
-        },
+        Some(look) => {
+            SkinSpec { section: look.section.into(), size: Profile(look.size.clone()), seam: look.seam, ..SkinSpec::new(look.lengths.clone(), thread.radius) }
+        }
+        None => SkinSpec { seam: (positions.len() > 3 && positions.first() == positions.last()).then_some(0.0), ..SkinSpec::new(lengths(), thread.radius) },
     }
 }
 

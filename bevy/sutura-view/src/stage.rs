@@ -37,7 +37,7 @@ pub struct Stage {
     pub past: Option<usize>,
     /// Time of playback in a recording \[s\].
     pub time: f64,
-    /// Up in the scene.
+    /// Up from the table.
     pub up: DVec3,
     /// How the scene wants to be looked at.
     pub camera: Option<Camera>,
@@ -180,13 +180,15 @@ fn replay(world: &mut World, trajectory: Trajectory) {
     let sample = sutura_scene::samples().iter().find(|s| s.name == header.scene);
     let scene = sample.and_then(|s| sutura_scene::Scene::parse(s.text, "sample.toml").ok());
     stage.camera = scene.as_ref().and_then(|s| s.camera().copied());
-    stage.up = upward(DVec3::NEG_Z, stage.camera.as_ref());
+    stage.up = upward(scene.as_ref().map_or(DVec3::NEG_Z, sutura_scene::Scene::gravity), stage.camera.as_ref());
     (stage.header, stage.frames, stage.recorded, stage.past) = (header, frames, true, Some(0));
 }
 
-/// Up is against gravity. Without gravity the table lies where the camera looks down at it.
+/// Up from the table is against gravity. Without gravity, or where the scene is looked at from below, the cloth lies behind what is looked at instead.
 fn upward(gravity: DVec3, camera: Option<&Camera>) -> DVec3 {
-    (-gravity).try_normalize().or(camera.map(|c| (c.from * 0.8 + c.up * 0.6).normalize_or(DVec3::Z))).unwrap_or(DVec3::Z)
+    let below = |up: &DVec3| camera.is_some_and(|c| c.from.dot(*up) < -0.1);
+    let behind = camera.map(|c| (c.from * 0.8 + c.up * 0.6).normalize_or(DVec3::Z));
+    (-gravity).try_normalize().filter(|up| !below(up)).or(behind).unwrap_or(DVec3::Z)
 }
 
 /// Least sine of the angle at which a table is looked down at: below it one would see its edge, or its underside.
@@ -331,8 +333,11 @@ pub fn aim(mut commands: Commands, stage: Res<Stage>, space: Res<Space>, orbit: 
     let toward = (up * 1.0 + right * -0.55 + orbit.home_direction() * 0.45).normalize();
     for (lamp, mut place) in &mut lamps {
         *place = Transform::from_translation(orbit.target + toward * orbit.distance).looking_at(orbit.target, right);
-        let (near, far) = (0.3 * orbit.distance, 2.2 * orbit.distance);
-        let cascades = CascadeShadowConfigBuilder { num_cascades: 1, minimum_distance: near, maximum_distance: far, ..default() }.build();
+        // Fine shadows where one looks, and coarser ones behind where that is close.
+        let (near, middle, far) = (0.3 * orbit.distance, 2.2 * orbit.distance, orbit.far());
+        let num_cascades = if far > 1.2 * middle { 2 } else { 1 };
+        let cascades = CascadeShadowConfigBuilder { num_cascades, minimum_distance: near, first_cascade_far_bound: middle, maximum_distance: far, ..default() };
+        let cascades = cascades.build();
         commands.entity(lamp).insert(cascades);
     }
 }

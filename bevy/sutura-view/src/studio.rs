@@ -10,6 +10,7 @@ use bevy::prelude::*;
 use bevy::render::RenderPlugin;
 use bevy::render::pipelined_rendering::PipelinedRenderingPlugin;
 use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages};
+use bevy::render::settings::{Backends, WgpuSettings};
 use bevy::render::view::screenshot::{Screenshot, ScreenshotCaptured};
 use bevy::window::ExitCondition;
 use bevy::winit::WinitPlugin;
@@ -78,12 +79,14 @@ const PATIENCE: u32 = 100;
 impl Studio {
     /// A studio for pictures of this size. It wants a Vulkan driver; one in software does.
     pub fn new(size: (u32, u32)) -> Studio {
+        // OpenGL looks for a display, and complains where there is none.
+        let settings = WgpuSettings { backends: Some(Backends::PRIMARY), ..default() };
         let mut app = App::new();
         app.add_plugins(
             DefaultPlugins
                 .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
                 // Nothing is drawn before everything is there.
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+                .set(RenderPlugin { synchronous_pipeline_compilation: true, render_creation: settings.into(), ..default() })
                 .set(quiet())
                 .disable::<WinitPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
@@ -128,11 +131,14 @@ impl Studio {
         self.app.update();
     }
 
-    /// Looks at everything as the scene wants it, or closer.
-    pub fn frame(&mut self, zoom: f64) {
+    /// Looks at everything as the scene wants it, or closer, or at another point \[m\].
+    pub fn frame(&mut self, zoom: f64, at: Option<[f64; 3]>) {
         let aspect = self.size.0 as f32 / self.size.1 as f32;
         let world = self.app.world_mut();
-        let orbit = stage::frame_view(world, aspect, zoom as f32);
+        let mut orbit = stage::frame_view(world, aspect, zoom as f32);
+        if let Some(at) = at {
+            orbit.target = world.resource::<Space>().place(DVec3::from_array(at));
+        }
         world.insert_resource(orbit);
         stage::thicken(world, self.size.1);
     }

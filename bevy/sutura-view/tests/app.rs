@@ -156,7 +156,7 @@ fn a_hand_in_a_scene_is_recorded_with_it_and_done_again() {
     // The file of what was done gives the same state.
     press(&mut app, KeyCode::Space);
     press(&mut app, KeyCode::F5);
-    let file = std::fs::read_dir(folder.path()).unwrap().filter_map(|e| e.ok()).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
+    let file = std::fs::read_dir(folder.path()).unwrap().filter_map(Result::ok).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
     let bytes = std::fs::read(file.unwrap()).unwrap();
     let again = Recording::from_bytes(&bytes).unwrap().replay(&mut |step| {
         assert!(step.is_same(), "step {}", step.step);

@@ -11,7 +11,7 @@ use sutura_bevy::{Drawn, Space, Strand, Thread};
 use sutura_scene::{Runner, Scene, samples};
 use sutura_view::{Picture, Studio};
 
-const SIZE: (u32, u32) = (960, 540);
+const SIZE: (u32, u32) = (640, 360);
 /// A color that nothing else has.
 const MAGENTA: Srgba = Srgba::rgb(0.95, 0.05, 0.95);
 
@@ -81,7 +81,7 @@ fn each_sample_scene_has_its_threads_where_they_are() {
     for sample in samples() {
         studio.open(sample.name).unwrap();
         studio.go(0.25);
-        studio.frame(1.0);
+        studio.frame(1.0, None);
         paint(studio.world());
         let picture = studio.draw().unwrap();
         let radius = studio.world().query::<&Strand>().iter(studio.world()).map(|s| s.skin.radius).fold(0.0, f64::max);
@@ -115,7 +115,7 @@ fn a_recording_is_drawn_like_the_run_that_it_is_of() {
     for name in [path.to_str().unwrap(), "hanging_helix"] {
         studio.open(name).unwrap();
         studio.go(time);
-        studio.frame(1.0);
+        studio.frame(1.0, None);
         paint(studio.world());
         let picture = studio.draw().unwrap();
         let width = studio.width(0.0);
@@ -133,7 +133,7 @@ fn the_graphics_processor_skins_as_the_engine_does() {
     // Closed, twisted, and wound up: every bone turns.
     studio.open("twisted_ring").unwrap();
     studio.go(1.0);
-    studio.frame(1.0);
+    studio.frame(1.0, None);
     paint(studio.world());
     let by_graphics = studio.draw().unwrap();
     // The same skin, posed by the engine and drawn as it is.
@@ -162,7 +162,7 @@ fn the_graphics_processor_skins_as_the_engine_does() {
     let off = |a: &Picture, b: &Picture| a.data.iter().zip(&b.data).filter(|(a, b)| a.abs_diff(**b) > 12).count();
     let thread = off(&by_engine, &nothing);
     let differ = off(&by_engine, &by_graphics);
-    assert!(thread > 5000, "{thread}");
+    assert!(thread > 2000, "{thread}");
     // Edges of a few pixels, from rounding.
     assert!(differ * 200 < thread, "{differ} of {thread}");
 }

@@ -339,6 +339,10 @@ impl Scene {
     pub fn stills(&self) -> &[f64] {
         &self.stills
     }
+    /// Gravity at its beginning \[m/s^2\].
+    pub fn gravity(&self) -> DVec3 {
+        self.settings.gravity
+    }
     /// How stills are looked at, when the scene says so.
     pub fn camera(&self) -> Option<&Camera> {
         self.camera.as_ref()

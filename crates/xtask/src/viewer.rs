@@ -43,7 +43,7 @@ pub fn check(tally: &mut Tally) {
 fn window(tally: &mut Tally, program: &std::path::Path) {
     println!("\n== viewer: window");
     let mut command = Command::new("xvfb-run");
-    command.args(["--auto-servernum", "--server-args=-screen 0 1024x640x24"]).arg(program).args(["--size", "800x480", "--try", "free_thread"]);
+    command.args(["--auto-servernum", "--server-args=-screen 0 1024x640x24"]).arg(program).args(["--size", "480x320", "--try", "free_thread"]);
     let result = crate::tally::status_within(command.stdin(Stdio::null()), Duration::from_secs(300));
     println!("   viewer: window: {}", if result.is_ok() { "passed" } else { "failed" });
     tally.count("viewer: window opens, every key is pressed, and it closes", result);

@@ -255,7 +255,11 @@ fn pose_bones(space: Res<Space>, strands: Query<(&Strand, &Drawn), Or<(Changed<S
         for (entity, bone) in drawn.bones.iter().zip(&posed) {
             let Ok(mut place) = bones.get_mut(*entity) else { continue };
             let (x, q) = (Vec3::from_array(bone.position.to_array()), Quat::from_array(bone.orientation.to_array()));
-            *place = GlobalTransform::from(Transform { translation: space.rotation * (x * space.scale), rotation: space.rotation * q, scale: Vec3::new(bone.scale, bone.scale, 1.0) });
+            *place = GlobalTransform::from(Transform {
+                translation: space.rotation * (x * space.scale),
+                rotation: space.rotation * q,
+                scale: Vec3::new(bone.scale, bone.scale, 1.0),
+            });
         }
     }
 }

@@ -28,10 +28,10 @@ pub struct Args {
     /// Folder for a sequence of pictures (PNG), from 0 to --at.
     #[arg(long, value_name = "FOLDER", requires = "headless")]
     pub frames: Option<PathBuf>,
-    /// Simulated time between the pictures of a sequence [s].
+    /// Simulated time between the pictures of a sequence, in seconds.
     #[arg(long, default_value_t = 1.0 / 15.0, value_name = "SECONDS")]
     pub every: f64,
-    /// Simulated time of the picture [s]; beyond the end of the scene it is the end.
+    /// Simulated time of the picture in seconds; beyond the end of the scene it is the end.
     #[arg(long, default_value_t = 0.5, value_name = "SECONDS")]
     pub at: f64,
     /// Size of pictures and window in pixels.
@@ -43,7 +43,7 @@ pub struct Args {
     /// Closeness of the view: 2 shows things twice as large.
     #[arg(long, default_value_t = 1.0)]
     pub zoom: f64,
-    /// Point in the middle of the view [m].
+    /// Point in the middle of the view, in meters.
     #[arg(long, value_parser = point, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "headless")]
     pub look_at: Option<[f64; 3]>,
     /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.

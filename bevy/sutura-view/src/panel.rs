@@ -136,7 +136,9 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
         let mut time = stage.shown().map_or(last, |f| f.time);
         let old = time;
         ui.spacing_mut().slider_width = 150.0;
-        ui.add_enabled(last > first, egui::Slider::new(&mut time, first..=last.max(first + 1e-9)).suffix(" s").fixed_decimals(2));
+        // Decimals by the formatter alone: a slider that is given a number of decimals rounds the time itself, which would count as a wish to go there.
+        let slider = egui::Slider::new(&mut time, first..=last.max(first + 1e-9)).custom_formatter(|t, _| format!("{t:.2} s"));
+        ui.add_enabled(last > first, slider);
         if time != old {
             go_to(world, time);
         }

@@ -313,7 +313,7 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
     ));
     out.say(format!(
         "**Without gravity** (a ten-thousandth of it, which says which way to bend) all but plain PBD show the loop: paper {} at 20 iterations, PBER {} at 80 ({} at 20, where it still creeps), direct {}, DER {}. \
-         PBER is converged at some 12 mm: the joints beside its held edges are softer, since a ghost point that is held cannot give way. **At the effective scale** gravity, weak as it is, wins over \
+         The joints beside the held edges of PBER are softer, since a ghost point that is held cannot give way. **At the effective scale** gravity, weak as it is, wins over \
          the constraints of 20 iterations: the loop of the paper's solver is {} and that of PBER {}; both grow with the iterations.",
         mm(p0.1.out_of_plane),
         mm(pb0.1.out_of_plane),

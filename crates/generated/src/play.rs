@@ -246,6 +246,7 @@ pub fn kind(incident: &IncidentKind) -> &'static str {
         IncidentKind::NotFinite => "not finite, rolled back",
         IncidentKind::Stuck { .. } => "stuck",
         IncidentKind::NotConverged { .. } => "not converged",
+        IncidentKind::LengthNotKept { .. } => "length not kept",
         IncidentKind::Teleport { .. } => "teleport",
         IncidentKind::BadInput { .. } => "bad input",
         IncidentKind::PassedThrough { .. } => "passed through",

@@ -18,7 +18,22 @@ use core::ops::Range;
 use glam::DVec3;
 
 /// Elongation to which inextensible elements are held.
-const LENGTH_TOLERANCE: f64 = 5e-6;
+pub(crate) const LENGTH_TOLERANCE: f64 = 5e-6;
+
+/// Elongation that is as good as none: held any longer, multipliers grow by 100 EA times it in each substep.
+pub(crate) const LENGTH_FLOOR: f64 = 1e-11;
+
+/// Turn of an iteration \[rad\] below which elongation of second order is not worth another one.
+const CALM: f64 = 1e-4;
+
+/// Turn \[rad\] of an iteration, and move in hundreds of radii, below which nothing moves at all.
+const STILL: f64 = 1e-7;
+
+/// Iterations in which lengths within the tolerance are looked after.
+const PATIENCE: u32 = 3;
+
+/// Elongation over that of the iteration before beyond which multipliers, which leave a hundredth where a thread can follow, do not bring a length back.
+const LASTING: f64 = 0.9;
 
 /// Least part of a step that is taken: a contact met on the way must be met, or the next step does not know of it.
 const SHORTEST: f64 = 0.3;
@@ -41,6 +56,8 @@ const SLACKEN: f64 = 0.2;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
     pub converged: bool,
+    /// Nothing moves any more, and yet an inextensible thread is off its length.
+    pub infeasible: bool,
     pub finite: bool,
     pub iterations: u32,
     /// Largest rotation of the last iteration \[rad\] and largest move in thread radii.
@@ -54,12 +71,13 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     row::couple::begin(scratch);
-    let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
+    let mut out = Outcome { converged: false, infeasible: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly is as
     // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
-    let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
+    let kept_before = length_error(model, &scratch.start) < LENGTH_TOLERANCE;
+    let (mut before, mut moved_before, mut stretched_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
     while out.iterations < settings.newton_max && !scratch.exhausted() {
@@ -107,7 +125,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             (waiting, exact) = (false, true);
         }
         out.residual = max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
-        let stretched = inextensible_error(model, state);
+        let stretched = length_error(model, &state.position);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
@@ -115,10 +133,20 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         // What the next iteration would do, going by what this one did after the one before.
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
         (before, moved_before) = (out.turn, out.residual);
-        let settled =
-            trusted && out.turn * rate < settings.tolerance && stretched < LENGTH_TOLERANCE && (scratch.rows.is_empty() || out.residual * rate < NEAR);
-        if scale >= 1.0
-            && settled
+        let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
+        // A turn leaves an elongation of second order, which the next one takes away. What else is left, of a thread that had its length, must not last.
+        let watched = kept_before && out.turn < CALM && out.iterations <= PATIENCE.min(settings.newton_max);
+        let still = out.turn < STILL && out.residual < 100.0 * STILL;
+        let lasts = stretched > LASTING * stretched_before;
+        if rests && lasts && stretched > if watched && still { LENGTH_FLOOR } else { LENGTH_TOLERANCE } {
+            out.infeasible = true;
+            break;
+        }
+        let watched = watched && !lasts && out.iterations < PATIENCE.min(settings.newton_max);
+        let owed = stretched > if watched { LENGTH_FLOOR.max(out.turn * out.turn) } else { LENGTH_TOLERANCE };
+        stretched_before = stretched;
+        if rests
+            && !owed
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
             && row::shape::settled(model, state, scratch, out.iterations)
@@ -177,7 +205,7 @@ fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let error = |e: usize, _| {
         let force = element_strain(model, state, e) * model.stretch_stiffness[e];
-        let tension = if model.inextensible[e] { 0.0 } else { scratch.tension[e] };
+        let tension = if model.inextensible[e] { 0.0 } else { scratch.tension[e] - model.offset[e] };
         force - scratch.shear[e].extend(tension)
     };
     work(scratch) + work_of_excess(state, scratch, error) - row::shape::work_unforeseen(scratch)
@@ -307,7 +335,7 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
             let (q, d) = (state.orientation[e], state.position[e + 1] - state.position[e]);
             let strain = q.conjugate() * d + strain_change(state, &scratch.step, e) * scale - DVec3::new(0.0, 0.0, model.rest_length[e]);
             let f = strain * model.stretch_stiffness[e];
-            scratch.tension[e] = if model.inextensible[e] { scratch.tension[e] + f.z } else { f.z };
+            scratch.tension[e] = f.z + if model.inextensible[e] { scratch.tension[e] } else { model.offset[e] };
             scratch.shear[e] = f.truncate();
         }
         for i in rod.clone() {
@@ -325,14 +353,19 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
     rows.sliders.apply(state, &rows.border, scale)
 }
 
-/// Largest |elongation| of an inextensible element: a second-order error of the turn that Newton just made.
-fn inextensible_error(model: &Model, state: &State) -> f64 {
+/// Whether every element whose length is a constraint keeps it.
+pub(crate) fn keeps_lengths(model: &Model, state: &State) -> bool {
+    length_error(model, &state.position) < LENGTH_TOLERANCE
+}
+
+/// Largest |elongation| of an element whose length is a constraint: a second-order error of the turn that Newton just made.
+fn length_error(model: &Model, x: &[DVec3]) -> f64 {
     // Least and largest square of length over rest length.
     let (mut least, mut most) = (1.0, 1.0);
     for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {
-        for e in rod.elements() {
+        for e in rod.elements().filter(|e| model.inextensible[*e]) {
             let l = model.rest_length[e];
-            let ratio = (state.position[e + 1] - state.position[e]).length_squared() / (l * l);
+            let ratio = (x[e + 1] - x[e]).length_squared() / (l * l);
             least = if ratio >= least { least } else { ratio };
             most = max_or_nan(most, ratio);
         }

@@ -57,6 +57,14 @@ pub enum IncidentKind {
         /// Largest move in the last iteration over the thread's radius.
         residual: f64,
     },
+    /// No motion keeps an inextensible thread at its length, as where its ends are driven apart, or none was found: for the rest of the step it stretched as
+    /// its material does.
+    LengthNotKept {
+        /// The thread.
+        rod: Handle<Rod>,
+        /// Elongation over its rest length of the element that is off most, in the end.
+        elongation: f64,
+    },
     /// A driven grip or shape jumped farther in one step than a motion can: it was moved over the step at the speed that this implies.
     Teleport {
         /// Distance \[m\].
@@ -85,6 +93,9 @@ impl core::fmt::Display for IncidentKind {
             IncidentKind::NotFinite => write!(f, "a number was not finite; the substep was rolled back"),
             IncidentKind::Stuck { reason } => write!(f, "no acceptable substep was found ({reason}); stayed at the last good state"),
             IncidentKind::NotConverged { residual } => write!(f, "accepted without convergence: last move {residual:.2e} radii"),
+            IncidentKind::LengthNotKept { elongation, .. } => {
+                write!(f, "no motion keeps an inextensible thread at its length (off by {:.3} %); it stretched as its material does", 100.0 * elongation)
+            }
             IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
             IncidentKind::BadInput { what } => write!(f, "bad input: {what}; nothing was done"),
             IncidentKind::NotInPaper { what } => write!(f, "the paper's solver does not know {what}; nothing moved"),

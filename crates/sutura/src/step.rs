@@ -5,6 +5,7 @@ use crate::integrator::{self, Method, Stage, touches_anew};
 use crate::math::{Pose, exp, log};
 use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind};
+use crate::model::rod::{RodModel, Stretch};
 use crate::model::shape::ShapeMotion;
 use crate::newton;
 use crate::params::{Integrator, Solver};
@@ -40,6 +41,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     state.time = interval.start;
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
+            take_up(model, state, report);
             scratch.fit(model);
             state.interrupt(Onset::Unknown);
             // Who looks from state to state must not lose sight of the motion to come.
@@ -48,6 +50,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
         scratch.work = 0.0;
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
+    take_up(model, state, report);
     // Where nothing acceptable was found, what is driven stays with the rest.
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
@@ -58,6 +61,9 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
 
 /// Why a substep is rejected whose numbers are not finite.
 const NOT_FINITE: &str = "not finite";
+
+/// Why one is in which inextensible threads cannot keep their length.
+const INFEASIBLE: &str = "an inextensible thread cannot keep its length";
 
 /// Why one is that would not come to an end.
 const TOO_MUCH: &str = "more work than a substep may take";
@@ -123,11 +129,19 @@ fn advance(
             true
         }
         Err(reason) => {
+            report.rejected += 1;
+            // Shorter substeps are of no help to a thread that cannot keep its length, or is off it already.
+            let last = depth >= model.settings.halvings || scratch.exhausted();
+            let from = &scratch.saved[depth as usize];
+            let tried = (reason == INFEASIBLE || last) && give_way(model, state, from, reason == INFEASIBLE);
+            let gives_way = tried || give_way(model, from, from, false);
             restore(state, scratch, depth);
             reel::follow(model, state);
-            report.rejected += 1;
+            if gives_way {
+                return advance(model, state, scratch, interval, t, h, depth, report);
+            }
             (state.last_h, state.calm) = (0.5 * h, 0);
-            if depth < model.settings.halvings && !scratch.exhausted() {
+            if !last {
                 let half = 0.5 * h;
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
@@ -142,6 +156,39 @@ fn advance(
             state.interrupt(Onset::Unknown);
             false
         }
+    }
+}
+
+/// Inextensible threads that are off their length in a state that was tried, be it `little`, stretch as their material does, as a thread does in truth, from
+/// the last good state to the end of the step. Whether there are any.
+fn give_way(model: &mut Model, tried: &State, from: &State, little: bool) -> bool {
+    let mut any = false;
+    for slot in 0..model.rods.len() as u32 {
+        let Some(rod) = model.rods.at(slot).filter(|r| model.inextensible[r.first as usize]) else { continue };
+        let elongation = most_elongated(model, rod, tried);
+        if elongation.abs() > if little { newton::LENGTH_FLOOR } else { newton::LENGTH_TOLERANCE } {
+            model.give_way(slot, from, elongation < 0.0);
+            any = true;
+        }
+    }
+    any
+}
+
+/// Elongation of the element that is off its length most.
+fn most_elongated(model: &Model, rod: &RodModel, state: &State) -> f64 {
+    let elongation = |e: usize| (state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0;
+    rod.elements().map(elongation).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
+}
+
+/// From the next step on those that gave way are to keep their length again. What they are off it by is told.
+fn take_up(model: &mut Model, state: &State, report: &mut StepReport) {
+    for slot in 0..model.rods.len() as u32 {
+        let Some(rod) = model.rods.at(slot).filter(|r| r.stretch == Stretch::Inextensible && !model.inextensible[r.first as usize]) else { continue };
+        let elongation = most_elongated(model, rod, state);
+        if elongation.abs() > newton::LENGTH_TOLERANCE {
+            report.incidents.push(Incident { time: state.time, kind: IncidentKind::LengthNotKept { rod: model.rods.handle(slot), elongation } });
+        }
+        model.keep_length(slot);
     }
 }
 
@@ -196,6 +243,8 @@ fn solve(
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
             Err(NOT_FINITE)
+        } else if outcome.infeasible || !outcome.converged && depth == model.settings.halvings && !newton::keeps_lengths(model, state) {
+            Err(INFEASIBLE)
         } else if !outcome.converged && scratch.exhausted() {
             Err(TOO_MUCH)
         } else if !outcome.converged && depth < model.settings.halvings {
@@ -415,7 +464,7 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, stage: &Stage
     for (rod, _) in &scratch.rods {
         for e in rod.start..rod.end - 1 {
             let strain = crate::rod::element_strain(model, state, e);
-            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
+            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z + model.offset[e] };
         }
     }
     yield_plastic(model, state);

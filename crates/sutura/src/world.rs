@@ -110,6 +110,7 @@ impl World {
             model.rest_length.push(after);
             state.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
+            model.offset.push(0.0);
             model.section.push(section);
             model.stretch_stiffness.push(DVec3::splat(section.ea));
             model.joint_length.push(0.0);
@@ -160,6 +161,7 @@ impl World {
             model.inertia,
             model.rest_length,
             model.inextensible,
+            model.offset,
             model.stretch_stiffness,
             model.joint_length,
             model.bend_stiffness,

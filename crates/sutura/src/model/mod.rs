@@ -10,7 +10,7 @@ pub mod weld;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
-use crate::state::LoadState;
+use crate::state::{LoadState, State};
 use glam::{DQuat, DVec3};
 use grip::LoadKind;
 use material::SectionStiffness;
@@ -52,8 +52,10 @@ pub struct Model {
     pub(crate) rest_half: Vec<DQuat>,
     /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; for inextensible rods that of the multiplier's penalty) \[N/m\].
     pub(crate) stretch_stiffness: Vec<DVec3>,
-    /// Whether the length of each element is a constraint.
+    /// Whether the length of each element is a constraint: where the thread is inextensible, unless it gives way for the rest of a step.
     pub(crate) inextensible: Vec<bool>,
+    /// Axial force of each element at its rest length \[N\]: zero, unless an inextensible thread gives way.
+    pub(crate) offset: Vec<f64>,
     /// Stiffness of each joint in bending about d1, d2 and twist about d3 \[N m/rad\].
     pub(crate) bend_stiffness: Vec<DVec3>,
     /// Relaxation time of Kelvin-Voigt damping of each joint \[s\].
@@ -83,6 +85,22 @@ impl Model {
             let penalty = if self.inextensible[e] { INEXTENSIBLE_PENALTY } else { 1.0 };
             let section = &self.section[e];
             self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, penalty * section.ea) / self.rest_length[e];
+        }
+    }
+    /// Lets a rod stretch from a state on, from which its tension grows by E A times the strain; what is to be shorter has no tension to begin with.
+    pub(crate) fn give_way(&mut self, slot: u32, from: &State, shorter: bool) {
+        for e in self.rods.at(slot).map_or(0..0, |r| r.elements()) {
+            self.inextensible[e] = false;
+            self.refresh_element(e);
+            let tension = if shorter { from.tension[e].min(0.0) } else { from.tension[e] };
+            self.offset[e] = tension - crate::rod::element_strain(self, from, e).z * self.stretch_stiffness[e].z;
+        }
+    }
+    /// Makes the length of a rod a constraint again.
+    pub(crate) fn keep_length(&mut self, slot: u32) {
+        for e in self.rods.at(slot).map_or(0..0, |r| r.elements()) {
+            (self.inextensible[e], self.offset[e]) = (true, 0.0);
+            self.refresh_element(e);
         }
     }
     /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of the next.

@@ -71,7 +71,8 @@ pub struct Closure {
 pub enum Stretch {
     /// By T / (E A).
     Elastic,
-    /// Not at all: lengths are constraints, held to the solver's tolerance.
+    /// Not at all: lengths are constraints, held to the solver's tolerance. Where no motion keeps them it stretches as its material does, and the report
+    /// says so ([`IncidentKind::LengthNotKept`](crate::IncidentKind::LengthNotKept)).
     Inextensible,
 }
 

@@ -197,7 +197,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let b = c - a;
         let along = t.dot(&d);
         let (t0, t1) = (scratch.tension[low], scratch.tension[high]);
-        let multiplier = |e: usize, t: f64| if model.inextensible[e] { t } else { 0.0 };
+        let multiplier = |e: usize, t: f64| if model.inextensible[e] { t } else { model.offset[e] };
         let pull = c * (along - l) + lanes(multiplier(low, t0), multiplier(high, t1));
         let force = d.plus(&t, -along).scaled(a).plus(&t, pull);
         // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is

@@ -1,0 +1,226 @@
+//! Inextensible threads between things that do not give way: held longer, shorter or just as long as they are.
+
+mod support;
+
+use core::f64::consts::PI;
+use support::t1;
+use sutura::glam::{DQuat, DVec3};
+use sutura::{
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Integrator, Material, Place, Pose, Rod, RodSpec, Settings, ShapeSpec, StepReport,
+    Stretch, World,
+};
+
+/// A frame [s].
+const DT: f64 = 1.0 / 60.0;
+
+/// Newton iterations that a frame of four substeps may take: each length that cannot be kept costs an attempt of a few.
+const MOST_ITERATIONS: u32 = 400;
+
+const INTEGRATORS: [Integrator; 2] = [Integrator::ImplicitEuler, Integrator::TrBdf2];
+
+/// Length of the thread [m].
+const LENGTH: f64 = 0.12;
+
+/// With some damping in bending, as real thread has.
+fn soft() -> (Material, f64) {
+    let (material, radius) = t1();
+    (Material { bend_damping: 0.01, ..material }, radius)
+}
+
+struct Held {
+    world: World,
+    rod: Handle<Rod>,
+    end: Handle<Grip>,
+    /// Along the thread.
+    along: DVec3,
+    /// E A [N].
+    ea: f64,
+}
+
+impl Held {
+    /// A straight thread held at both ends.
+    fn new(settings: Settings, hold: Hold, along: DVec3, stretch: Stretch) -> Self {
+        let (material, radius) = soft();
+        let ea = material.young_modulus * PI * radius * radius;
+        let mut world = World::new(settings).unwrap();
+        let rod = world.insert_rod(&RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, along * LENGTH, 48, radius, material) }).unwrap();
+        world.insert_grip(&GripSpec::at_once(rod, Place::Start, hold)).unwrap();
+        let end = world.insert_grip(&GripSpec::at_once(rod, Place::End, hold)).unwrap();
+        Held { world, rod, end, along, ea }
+    }
+    fn still(hold: Hold) -> Self {
+        Held::new(Settings { gravity: DVec3::ZERO, ..Settings::default() }, hold, DVec3::X, Stretch::Inextensible)
+    }
+    /// Moves the end on by a distance, in a frame.
+    fn draw(&mut self, by: f64) -> StepReport {
+        let pose = self.world.grip_pose(self.end).unwrap();
+        self.world.set_grip_pose(self.end, Pose::new(pose.position + self.along * by, pose.orientation)).unwrap();
+        let report = self.world.step(DT);
+        assert!(report.newton_iterations < MOST_ITERATIONS, "{report:?}");
+        assert!(report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })), "{:?}", report.incidents);
+        report
+    }
+    /// Force of the end on the thread, along it [N].
+    fn force(&self) -> f64 {
+        self.world.grip_wrench(self.end).unwrap().force.dot(self.along)
+    }
+    fn elongation(&self) -> f64 {
+        self.world.rod(self.rod).unwrap().max_elongation()
+    }
+}
+
+fn close(got: f64, want: f64, part: f64, what: &str) {
+    assert!((got - want).abs() <= part * want.abs(), "{what}: {got:e}, not {want:e}");
+}
+
+#[test]
+fn drawn_beyond_its_length_it_pulls_back_as_its_material_does_and_is_itself_again_after() {
+    for integrator in INTEGRATORS {
+        for hold in [Hold::Pin, Hold::Clamp, Hold::Jaw] {
+            for along in [DVec3::X, DVec3::new(0.48, -0.6, 0.64)] {
+                let mut held = Held::new(Settings { integrator, ..Settings::default() }, hold, along, Stretch::Inextensible);
+                let what = format!("{integrator:?} {hold:?} {along}");
+                // First slack, then drawn to 3 % beyond, held, and slack again.
+                (0..30).for_each(|_| drop(held.draw(-1e-4)));
+                let slack = held.force();
+                assert!(slack.abs() < 0.01 && held.elongation() < 5e-6, "{what}: {slack}");
+                (0..50).for_each(|_| drop(held.draw(1.01e-4)));
+                // Taut it is, with what tension its weight and its swing gave it on the way.
+                let taut = held.force();
+                (0..20).for_each(|_| drop(held.draw(1.01e-4)));
+                let report = held.draw(0.0);
+                // What a jaw holds does not stretch.
+                let length = if hold == Hold::Jaw { LENGTH * 46.0 / 48.0 } else { LENGTH };
+                close(held.force() - taut, held.ea * 20.0 * 1.01e-4 / length, 5e-3, &what);
+                close(held.force(), held.ea * 4.07e-3 / length, 0.03, &what);
+                assert!(matches!(report.incidents[..], [ref i] if matches!(i.kind, IncidentKind::LengthNotKept { rod, .. } if rod == held.rod)), "{what}");
+                (0..70).for_each(|_| drop(held.draw(-1.01e-4)));
+                let report = held.draw(0.0);
+                assert!(report.incidents.is_empty() && held.elongation() < 5e-6, "{what}: {:e} {report:?}", held.elongation());
+                assert!(held.force().abs() < 0.01, "{what}: slack it pulls with {}", held.force());
+            }
+        }
+    }
+}
+
+#[test]
+fn held_at_its_length_its_tension_stays_what_it_was() {
+    // Within the tolerance of lengths, where multipliers would grow without end: 6 to 70 N in these 5 s.
+    for by in [1e-6, 4e-6, -1e-6] {
+        for hold in [Hold::Pin, Hold::Clamp] {
+            let mut held = Held::still(hold);
+            held.draw(by * LENGTH);
+            for _ in 0..300 {
+                assert!(held.draw(0.0).incidents.is_empty());
+            }
+            close(held.force(), held.ea * by, 0.02, &format!("{hold:?} by {by}"));
+        }
+    }
+}
+
+#[test]
+fn drawn_by_a_force_and_then_held_it_keeps_its_tension_and_gains_what_it_is_stretched_by() {
+    for integrator in INTEGRATORS {
+        let mut held = Held::new(Settings { gravity: DVec3::ZERO, integrator, ..Settings::default() }, Hold::Pin, DVec3::X, Stretch::Inextensible);
+        held.world.set_grip_drive(held.end, Drive::Force { direction: DVec3::X, force: 2.0, speed_limit: 0.05 }).unwrap();
+        for _ in 0..60 {
+            assert!(held.world.step(DT).incidents.is_empty());
+        }
+        held.world.set_grip_drive(held.end, Drive::Pose).unwrap();
+        (0..300).for_each(|_| drop(held.draw(0.0)));
+        close(held.force(), 2.0, 1e-3, "held");
+        (0..12).for_each(|_| drop(held.draw(1e-5)));
+        close(held.force(), 2.0 + held.ea * 1e-3, 1e-3, "drawn on");
+        (0..12).for_each(|_| drop(held.draw(-1e-5)));
+        close(held.force(), 2.0, 1e-3, "and back");
+        held.draw(-2e-5);
+        close(held.force(), -held.ea * 2e-5 / LENGTH, 1e-3, "shorter than it is it has no tension, and is pressed along itself");
+    }
+}
+
+#[test]
+fn pressed_along_itself_it_resists_as_its_material_does() {
+    for integrator in INTEGRATORS {
+        for substep in [DT / 4.0, DT / 100.0] {
+            let settings = Settings { gravity: DVec3::ZERO, integrator, substep, ..Settings::default() };
+            let run = |stretch| {
+                let mut held = Held::new(settings.clone(), Hold::Clamp, DVec3::X, stretch);
+                for _ in 0..10 {
+                    held.world.set_grip_pose(held.end, shifted(&held, -1e-4)).unwrap();
+                    let report = held.world.step(DT);
+                    assert!(report.newton_iterations <= 400, "{report:?}");
+                }
+                held.force()
+            };
+            close(run(Stretch::Inextensible), run(Stretch::Elastic), 1e-6, &format!("{integrator:?} {substep}"));
+        }
+    }
+}
+
+fn shifted(held: &Held, by: f64) -> Pose {
+    let pose = held.world.grip_pose(held.end).unwrap();
+    Pose::new(pose.position + held.along * by, pose.orientation)
+}
+
+/// Force of the end of a thread around a post, whose other end is held, while the end is drawn by 3 mm and let back by 4.
+fn around_a_post(stretch: Stretch, integrator: Integrator) -> Vec<f64> {
+    let (material, radius) = soft();
+    let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
+    world.set_friction(0, 0, Friction::coulomb(0.2)).unwrap();
+    let (post, arm) = (5e-3, 0.04);
+    let around = post + radius + 1e-5;
+    let length = 2.0 * arm + around * PI;
+    let at = |s: f64| match s {
+        s if s < arm => DVec3::new(-around, 0.0, s - arm),
+        s if s < arm + around * PI => DVec3::new(-around * ((s - arm) / around).cos(), 0.0, around * ((s - arm) / around).sin()),
+        s => DVec3::new(around, 0.0, arm + around * PI - s),
+    };
+    let points = (0..=80).map(|i| at(length * f64::from(i) / 80.0)).collect();
+    let rod = world.insert_rod(&RodSpec { stretch, ..RodSpec::new(points, radius, material) }).unwrap();
+    let lying = Pose::new(DVec3::ZERO, DQuat::from_rotation_x(PI / 2.0));
+    world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: post, half_length: 0.02 }, lying)).unwrap();
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Jaw)).unwrap();
+    let end = world.insert_grip(&GripSpec::at_once(rod, Place::End, Hold::Clamp)).unwrap();
+    let mut forces = Vec::new();
+    for f in 0..130 {
+        let pose = world.grip_pose(end).unwrap();
+        let by = if f < 60 { -5e-5 } else { 6e-5 };
+        world.set_grip_pose(end, Pose::new(pose.position + DVec3::Z * by, pose.orientation)).unwrap();
+        let report = world.step(DT);
+        assert!(report.converged && report.newton_iterations < MOST_ITERATIONS, "{stretch:?} {f}: {report:?}");
+        forces.push(world.grip_wrench(end).unwrap().force.length());
+    }
+    if stretch == Stretch::Inextensible {
+        let left = world.rod(rod).unwrap().max_elongation();
+        assert!(left < 5e-6, "slack again it is longer by {left:e}");
+    }
+    forces
+}
+
+#[test]
+fn taut_around_a_post_it_pulls_as_its_material_does() {
+    for integrator in INTEGRATORS {
+        let (got, want) = (around_a_post(Stretch::Inextensible, integrator), around_a_post(Stretch::Elastic, integrator));
+        for f in (5..100).step_by(5) {
+            close(got[f], want[f], 0.003, &format!("{integrator:?} frame {f}"));
+        }
+        assert!(want[59] > 3.0 && got[129] < 0.05, "{} {}", want[59], got[129]);
+    }
+}
+
+#[test]
+fn the_same_input_gives_the_same_bits_with_and_without_working_memory() {
+    let hashes = |forget: bool| {
+        let mut held = Held::new(Settings::default(), Hold::Pin, DVec3::X, Stretch::Inextensible);
+        let mut out = Vec::new();
+        for f in 0..60 {
+            if forget {
+                held.world.forget_scratch();
+            }
+            held.draw(if f < 30 { 1e-4 } else { -1.2e-4 });
+            out.push(held.world.state_hash());
+        }
+        out
+    };
+    assert_eq!(hashes(false), hashes(true));
+}

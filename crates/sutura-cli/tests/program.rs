@@ -326,11 +326,12 @@ fn scenes_and_recordings_are_exported() {
     assert!(glb.starts_with(b"glTF"));
     assert!(said(&["export", recording, "--out", "all.csv", "--fps", "60", "--to", "0.05"]).starts_with("4 frames"));
     assert!(said(&["export", recording, "--out", "last.obj", "--quiet"]).is_empty());
-    // A scene is run, and knows its forces; a recording has none.
+    // A scene that is run knows its velocities as well; a recording its forces.
     said(&["export", "swing.toml", "--format", "vtk", "--out", "live", "--set", "thread.thread.elements=10"]);
     said(&["export", recording, "--format", "vtk"]);
-    let field = |file: &str| std::fs::read_to_string(folder.path().join(file)).expect("a file").contains("\"tension\"");
-    assert!(field("live/threads_00003.vtp") && !field("out/swing/vtk/threads_00003.vtp"));
+    let has = |file: &str, field: &str| std::fs::read_to_string(folder.path().join(file)).expect("a file").contains(&format!("\"{field}\""));
+    assert!(has("live/threads_00003.vtp", "tension") && has("out/swing/vtk/threads_00003.vtp", "tension"));
+    assert!(has("live/threads_00003.vtp", "velocity") && !has("out/swing/vtk/threads_00003.vtp", "velocity"));
     assert!(folder.path().join("live/threads.pvd").is_file() && !folder.path().join("live/shapes.pvd").exists());
     let refused = sutura(folder.path(), &["export", recording, "--out", "x.glb", "--from", "9"]);
     assert_eq!(refused.status.code(), Some(2));

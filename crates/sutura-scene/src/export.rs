@@ -1,7 +1,7 @@
 //! Scenes and recordings as files that other programs open: glTF (GLB), VTK, OBJ, CSV.
 //!
 //! An [`Exporter`] is given moments in order of time, from a recording ([`Moment::of_frame`]) or from a run under way ([`Moment::of_runner`]), which also
-//! knows velocities and forces. Equal moments give equal bytes.
+//! knows velocities. Equal moments give equal bytes.
 
 mod csv;
 mod glb;
@@ -77,15 +77,15 @@ pub struct Strand {
     pub positions: Vec<DVec3>,
     /// Material frames, n.
     pub orientations: Vec<DQuat>,
-    /// What only a run under way knows.
-    pub live: Option<Live>,
+    /// Velocity of each particle \[m/s\]; only a run under way knows it.
+    pub velocities: Option<Vec<DVec3>>,
+    /// Its forces; recordings of version 1 do not say.
+    pub loads: Option<Loads>,
 }
 
-/// Velocities and forces of a thread.
+/// Forces of a thread.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Live {
-    /// Of each particle \[m/s\].
-    pub velocities: Vec<DVec3>,
+pub struct Loads {
     /// Of each element \[N\], positive when stretched.
     pub tensions: Vec<f64>,
     /// Force of all contacts on each particle \[N\]: that on an element, shared by the lever.
@@ -340,31 +340,40 @@ impl Moment {
         let strand = |(x, q): (&Vec<[f32; 3]>, &Vec<[f32; 4]>)| Strand {
             positions: x.iter().map(point).collect(),
             orientations: q.iter().map(turn).collect(),
-            live: None,
+            ..Strand::default()
         };
-        Moment {
+        let mut moment = Moment {
             time: frame.time,
             threads: frame.positions.iter().zip(&frame.orientations).map(strand).collect(),
             shapes: frame.shapes.iter().map(|(x, q)| Pose::new(point(x), turn(q))).collect(),
+        };
+        if let Some(forces) = &frame.forces {
+            for (strand, tensions) in moment.threads.iter_mut().zip(&forces.tensions) {
+                strand.load(tensions.iter().map(|t| f64::from(*t)).collect());
+            }
+            for contact in &forces.contacts {
+                for (place, sign) in contact.places().zip([1.0, -1.0]) {
+                    moment.push(place.thread as usize, place.element as usize, f64::from(place.s), point(&contact.force) * sign);
+                }
+            }
         }
+        moment
     }
 
     /// The state of a run under way.
     pub fn of_runner(runner: &Runner) -> Self {
-        let mut threads: Vec<(usize, Strand)> = Vec::new();
+        let mut moment = Moment { time: runner.time(), threads: Vec::new(), shapes: runner.shape_poses().collect() };
+        let mut slots = Vec::new();
         for rod in runner.rods() {
-            let live = Live {
-                velocities: rod.velocities().to_vec(),
-                tensions: (0..rod.n_elements()).map(|e| rod.tension(e)).collect(),
-                contact_forces: vec![DVec3::ZERO; rod.n_elements() + 1],
-            };
-            threads.push((rod.slot(), Strand { positions: rod.positions().to_vec(), orientations: rod.orientations().to_vec(), live: Some(live) }));
+            let (positions, orientations) = (rod.positions().to_vec(), rod.orientations().to_vec());
+            let mut strand = Strand { positions, orientations, velocities: Some(rod.velocities().to_vec()), loads: None };
+            strand.load((0..rod.n_elements()).map(|e| rod.tension(e)).collect());
+            moment.threads.push(strand);
+            slots.push(rod.slot());
         }
         let mut push = |slot: usize, element: usize, s: f64, force: DVec3| {
-            let live = threads.iter_mut().find(|t| t.0 == slot).and_then(|t| t.1.live.as_mut());
-            if let Some(live) = live {
-                live.contact_forces[element] += force * (1.0 - s);
-                live.contact_forces[element + 1] += force * s;
+            if let Some(thread) = slots.iter().position(|k| *k == slot) {
+                moment.push(thread, element, s, force);
             }
         };
         for contact in runner.world().contacts() {
@@ -373,6 +382,22 @@ impl Moment {
                 push(slot, element, s, -contact.force);
             }
         }
-        Moment { time: runner.time(), threads: threads.into_iter().map(|t| t.1).collect(), shapes: runner.shape_poses().collect() }
+        moment
+    }
+
+    /// Adds the force of a contact on a place of a thread.
+    fn push(&mut self, thread: usize, element: usize, s: f64, force: DVec3) {
+        let loads = self.threads.get_mut(thread).and_then(|t| t.loads.as_mut());
+        if let Some([before, after]) = loads.and_then(|l| l.contact_forces.get_mut(element..element + 2)) {
+            *before += force * (1.0 - s);
+            *after += force * s;
+        }
+    }
+}
+
+impl Strand {
+    /// Tensions, and no contact yet.
+    fn load(&mut self, tensions: Vec<f64>) {
+        self.loads = Some(Loads { contact_forces: vec![DVec3::ZERO; tensions.len() + 1], tensions });
     }
 }

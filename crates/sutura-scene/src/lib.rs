@@ -35,5 +35,5 @@ pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
 pub use scene::{Camera, Scene};
 pub use table::{TableError, points_from_table};
-pub use trajectory::{Frame, Header, SectionOutline, Shape, ShapeOutline, Thread, ThreadLook, Trajectory, TrajectoryError};
+pub use trajectory::{Contact, Forces, Frame, Header, OnThread, SectionOutline, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory, TrajectoryError};
 pub use units::in_si;

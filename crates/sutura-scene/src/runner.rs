@@ -6,14 +6,14 @@ use crate::report::{
 };
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
-use crate::trajectory::{Frame, Header, Shape, ShapeOutline, Thread, ThreadLook, Trajectory};
+use crate::trajectory::{Contact, Forces, Frame, Header, OnThread, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory};
 use crate::watch::{Check, Probe, profile};
 use cpu_time::ThreadTime;
 use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{Grip, Handle, IncidentKind, Pose, Rod, RodView, World};
+use sutura::{ContactWith, Grip, Handle, IncidentKind, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -491,6 +491,28 @@ impl Runner {
                 })
                 .collect(),
             grips: (0..self.scene.grips.len()).map(|i| self.stage.grip_pose(i).map(|p| v(p.position))).collect(),
+            forces: Some(self.forces()),
+        }
+    }
+    fn forces(&self) -> Forces {
+        let stage = &self.stage;
+        let v = |p: DVec3| p.as_vec3().to_array();
+        // Things of the scene alone are in its world, so each has its number.
+        let thread = |slot: usize| stage.threads.iter().position(|h| h.index() == slot).map(|i| i as u32);
+        let shape = |slot: usize| stage.shapes.iter().position(|h| h.index() == slot).map(|i| i as u32);
+        let on = |slot: usize, element: usize, s: f64| Some(OnThread { thread: thread(slot)?, element: element as u32, s: s as f32 });
+        let contact = |c: sutura::ContactView| {
+            let with = match c.b {
+                ContactWith::Thread(slot, element, s) => Touched::Thread(on(slot, element, s)?),
+                ContactWith::Shape(slot) => Touched::Shape(shape(slot)?),
+            };
+            Some(Contact { on: on(c.a.0, c.a.1, c.s)?, with, point: v(c.point), normal: v(c.normal), force: v(c.force), sliding: c.sliding })
+        };
+        let grip = |i: usize| stage.grip(i).and_then(|h| stage.world.grip_wrench(h).ok()).map_or([0.0; 3], |w| v(w.force));
+        Forces {
+            tensions: stage.rods().map(|r| (0..r.n_elements()).map(|e| r.tension(e) as f32).collect()).collect(),
+            grips: (0..self.scene.grips.len()).map(grip).collect(),
+            contacts: stage.world.contacts().filter_map(contact).collect(),
         }
     }
     fn record(&mut self) {

@@ -180,6 +180,56 @@ pub struct Frame {
     pub shapes: Vec<([f32; 3], [f32; 4])>,
     /// Where each grip holds \[m\]; `None` while it does not.
     pub grips: Vec<Option<[f32; 3]>>,
+    /// What acts; recordings of version 1 do not say.
+    pub forces: Option<Forces>,
+}
+
+/// What acts in a frame.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Forces {
+    /// Tension of each element of each thread \[N\], positive when stretched.
+    pub tensions: Vec<Vec<f32>>,
+    /// Force of each grip on its thread \[N\]; zero while it does not hold.
+    pub grips: Vec<[f32; 3]>,
+    /// Contacts that carry force.
+    pub contacts: Vec<Contact>,
+}
+
+/// A contact that carries force.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Where on a thread.
+    pub on: OnThread,
+    /// What it touches.
+    pub with: Touched,
+    /// The point on the centerline \[m\].
+    pub point: [f32; 3],
+    /// Unit normal toward the thread.
+    pub normal: [f32; 3],
+    /// Force on the thread, normal and friction \[N\].
+    pub force: [f32; 3],
+    /// Whether it slid; else it stuck.
+    pub sliding: bool,
+}
+
+/// A place on a thread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OnThread {
+    /// Number of the thread in the header.
+    pub thread: u32,
+    /// Its element.
+    pub element: u32,
+    /// Where on it, 0 at its first particle, 1 at its second.
+    pub s: f32,
+}
+
+/// The other side of a contact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Touched {
+    /// The same thread, or another one.
+    Thread(OnThread),
+    /// A shape, by its number in the header.
+    Shape(u32),
 }
 
 /// Why a recording could not be written or read.
@@ -222,7 +272,11 @@ impl<'a> IntoIterator for &'a Trajectory {
 }
 
 const MAGIC: &[u8; 8] = b"SUTURATR";
-const VERSION: u32 = 1;
+/// Version 1 has no forces.
+const VERSION: u32 = 2;
+
+/// Bytes of a contact.
+const CONTACT: usize = 64;
 
 impl Trajectory {
     /// The bytes of the file: `SUTURATR`, version, header length, header as JSON, number of frames, frames, checksum.
@@ -247,6 +301,12 @@ impl Trajectory {
                 // A grip that does not hold is written as not-a-number.
                 grip.unwrap_or([f32::NAN; 3]).iter().for_each(|v| put(*v, &mut out));
             }
+            out.extend_from_slice(&u32::from(frame.forces.is_some()).to_le_bytes());
+            if let Some(forces) = &frame.forces {
+                forces.tensions.iter().flatten().chain(forces.grips.iter().flatten()).for_each(|v| put(*v, &mut out));
+                out.extend_from_slice(&(forces.contacts.len() as u32).to_le_bytes());
+                forces.contacts.iter().for_each(|c| c.put(&mut out));
+            }
         }
         let sum = crc32fast::hash(&out);
         out.extend_from_slice(&sum.to_le_bytes());
@@ -262,8 +322,8 @@ impl Trajectory {
         let mut reader = Reader { bytes: &bytes[..bytes.len() - 4], at: 8 };
         let short = || damaged("cut short");
         let version = reader.u32().ok_or_else(short)?;
-        if version != VERSION {
-            return Err(TrajectoryError::Damaged(format!("version {version}, this program reads version {VERSION}")));
+        if !(1..=VERSION).contains(&version) {
+            return Err(TrajectoryError::Damaged(format!("version {version}, this program reads versions 1 to {VERSION}")));
         }
         let stored = u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap_or_default());
         if crc32fast::hash(reader.bytes) != stored {
@@ -273,25 +333,28 @@ impl Trajectory {
         let header: Header = serde_json::from_slice(reader.take(length).ok_or_else(short)?).map_err(|e| TrajectoryError::Damaged(format!("header: {e}")))?;
         let count = reader.u64().ok_or_else(short)?;
         let mut trajectory = Trajectory { header, frames: Vec::new() };
-        // The size must fit before anything is allocated for it.
-        let wanted = trajectory.frame_bytes().and_then(|b| b.checked_mul(count));
-        if wanted != Some((reader.bytes.len() - reader.at) as u64) {
+        // The size must fit before anything is allocated for it. With forces a frame is longer than that.
+        let (left, least) = ((reader.bytes.len() - reader.at) as u64, trajectory.frame_bytes(version).and_then(|b| b.checked_mul(count)));
+        if least.is_none_or(|least| if version == 1 { least != left } else { least > left }) {
             return Err(damaged("the number of frames does not fit the length of the file"));
         }
         for i in 0..count {
-            let frame = reader.frame(&trajectory.header).ok_or_else(short)?;
+            let frame = reader.frame(&trajectory.header, version).ok_or_else(short)?;
             if !frame.is_finite() {
                 return Err(TrajectoryError::Damaged(format!("a number of frame {i} is not finite")));
             }
             trajectory.frames.push(frame);
         }
+        if reader.at != reader.bytes.len() {
+            return Err(damaged("there is more in the file than its frames"));
+        }
         Ok(trajectory)
     }
 
-    /// Bytes of a frame, by the header; `None` where they are beyond counting.
-    fn frame_bytes(&self) -> Option<u64> {
+    /// Bytes of a frame without forces, by the header; `None` where they are beyond counting.
+    fn frame_bytes(&self, version: u32) -> Option<u64> {
         // The counts of shapes and grips are those of what was read, so their bytes are few.
-        let mut sum = 8 + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64;
+        let mut sum = if version == 1 { 8 } else { 12 } + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64;
         for t in &self.header.threads {
             sum = sum.checked_add((t.elements as u64).checked_mul(28)?.checked_add(12)?)?;
         }
@@ -304,16 +367,64 @@ impl Frame {
         let points = self.positions.iter().flatten().flatten().chain(self.grips.iter().flatten().flatten());
         let poses = self.shapes.iter().flat_map(|(x, q)| x.iter().chain(q));
         let mut numbers = points.chain(self.orientations.iter().flatten().flatten()).chain(poses);
-        self.time.is_finite() && numbers.all(|v| v.is_finite())
+        self.time.is_finite() && numbers.all(|v| v.is_finite()) && self.forces.as_ref().is_none_or(Forces::is_finite)
     }
-}
 
-impl Frame {
     /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts of the thread's elements.
     pub(crate) fn fit(&mut self, header: &Header) {
         for (thread, (x, q)) in header.threads.iter().zip(self.positions.iter_mut().zip(&mut self.orientations)) {
             refit(thread.elements, x, q, |a, b, u| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * u as f32));
         }
+        if let Some(forces) = &mut self.forces {
+            forces.fit(header);
+        }
+    }
+}
+
+impl Forces {
+    fn is_finite(&self) -> bool {
+        let contacts = self.contacts.iter().flat_map(|c| c.point.iter().chain(&c.normal).chain(&c.force).copied().chain(c.places().map(|p| p.s)));
+        self.tensions.iter().flatten().chain(self.grips.iter().flatten()).copied().chain(contacts).all(f32::is_finite)
+    }
+
+    fn fit(&mut self, header: &Header) {
+        let had: Vec<usize> = self.tensions.iter().map(Vec::len).collect();
+        for (thread, tensions) in header.threads.iter().zip(&mut self.tensions) {
+            refit_elements(thread.elements, tensions);
+        }
+        for place in self.contacts.iter_mut().flat_map(Contact::places_mut) {
+            let (had, now) = (had[place.thread as usize], header.threads[place.thread as usize].elements);
+            if had != now {
+                let along = (f64::from(place.element) + f64::from(place.s)) * now as f64 / had as f64;
+                let element = (along as usize).min(now - 1);
+                (place.element, place.s) = (element as u32, (along - element as f64).clamp(0.0, 1.0) as f32);
+            }
+        }
+    }
+}
+
+impl Contact {
+    /// Its places on threads.
+    pub(crate) fn places(&self) -> impl Iterator<Item = OnThread> + use<> {
+        let other = if let Touched::Thread(place) = self.with { Some(place) } else { None };
+        std::iter::once(self.on).chain(other)
+    }
+    fn places_mut(&mut self) -> impl Iterator<Item = &mut OnThread> {
+        let other = if let Touched::Thread(place) = &mut self.with { Some(place) } else { None };
+        std::iter::once(&mut self.on).chain(other)
+    }
+    fn put(&self, out: &mut Vec<u8>) {
+        let (shape, other) = match self.with {
+            Touched::Thread(place) => (0, place),
+            Touched::Shape(shape) => (1, OnThread { thread: shape, element: 0, s: 0.0 }),
+        };
+        for place in [self.on, other] {
+            out.extend_from_slice(&place.thread.to_le_bytes());
+            out.extend_from_slice(&place.element.to_le_bytes());
+            out.extend_from_slice(&place.s.to_le_bytes());
+        }
+        out.extend_from_slice(&(shape + 2 * u32::from(self.sliding)).to_le_bytes());
+        self.point.iter().chain(&self.normal).chain(&self.force).for_each(|v| out.extend_from_slice(&v.to_le_bytes()));
     }
 }
 
@@ -329,7 +440,15 @@ pub(crate) fn refit<P: Copy, Q: Copy>(n: usize, x: &mut Vec<P>, q: &mut Vec<Q>, 
         lerp(x[e], x[e + 1], s - e as f64)
     };
     *x = (0..=n).map(at).collect();
-    *q = (0..n).map(|k| q[(((k as f64 + 0.5) * had as f64 / n as f64) as usize).min(had - 1)]).collect();
+    refit_elements(n, q);
+}
+
+/// What `n` elements have where others lie.
+pub(crate) fn refit_elements<Q: Copy>(n: usize, q: &mut Vec<Q>) {
+    let had = q.len();
+    if n != had && had > 0 {
+        *q = (0..n).map(|k| q[(((k as f64 + 0.5) * had as f64 / n as f64) as usize).min(had - 1)]).collect();
+    }
 }
 
 struct Reader<'a> {
@@ -359,7 +478,37 @@ impl<'a> Reader<'a> {
         }
         Some(out)
     }
-    fn frame(&mut self, header: &Header) -> Option<Frame> {
+    fn place(&mut self) -> Option<OnThread> {
+        Some(OnThread { thread: self.u32()?, element: self.u32()?, s: f32::from_le_bytes(self.array()?) })
+    }
+    /// `None` also where it is on a thread or shape that is not there.
+    fn contact(&mut self, header: &Header) -> Option<Contact> {
+        let is_there = |p: &OnThread| header.threads.get(p.thread as usize).is_some_and(|t| (p.element as usize) < t.elements);
+        let (on, other, kind) = (self.place()?, self.place()?, self.u32()?);
+        let with = match kind & 1 {
+            0 => Touched::Thread(Some(other).filter(is_there)?),
+            _ => Touched::Shape(Some(other.thread).filter(|s| (*s as usize) < header.shapes.len())?),
+        };
+        let (point, normal, force) = (self.f32s()?, self.f32s()?, self.f32s()?);
+        Some(Contact { on: Some(on).filter(is_there)?, with, point, normal, force, sliding: kind & 2 != 0 })
+    }
+    fn forces(&mut self, header: &Header) -> Option<Forces> {
+        let mut forces = Forces::default();
+        for thread in &header.threads {
+            let bytes = self.take(thread.elements.checked_mul(4)?)?;
+            forces.tensions.push(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect());
+        }
+        for _ in &header.grips {
+            forces.grips.push(self.f32s()?);
+        }
+        let count = self.u32()? as usize;
+        if count > (self.bytes.len() - self.at) / CONTACT {
+            return None;
+        }
+        forces.contacts = (0..count).map(|_| self.contact(header)).collect::<Option<_>>()?;
+        Some(forces)
+    }
+    fn frame(&mut self, header: &Header, version: u32) -> Option<Frame> {
         let mut frame = Frame { time: f64::from_le_bytes(self.array()?), ..Frame::default() };
         for thread in &header.threads {
             frame.positions.push((0..=thread.elements).map(|_| self.f32s()).collect::<Option<_>>()?);
@@ -371,6 +520,13 @@ impl<'a> Reader<'a> {
         for _ in &header.grips {
             let x: [f32; 3] = self.f32s()?;
             frame.grips.push((!x[0].is_nan()).then_some(x));
+        }
+        if version > 1 {
+            frame.forces = match self.u32()? {
+                0 => None,
+                1 => Some(self.forces(header)?),
+                _ => return None,
+            };
         }
         Some(frame)
     }
@@ -390,12 +546,25 @@ mod tests {
             shapes: vec![Shape { name: "post".into(), outline: ShapeOutline::Cylinder { radius: 0.005, half_length: 0.01 } }],
             grips: vec!["left".into(), "right".into()],
         };
+        let touch = |with: Touched| Contact {
+            on: OnThread { thread: 0, element: 0, s: 0.25 },
+            with,
+            point: [0.0, 0.1, 0.2],
+            normal: [1.0, 0.0, 0.0],
+            force: [0.3, 0.0, 0.1],
+            sliding: with == Touched::Shape(0),
+        };
         let frame = |t: f64| Frame {
             time: t,
             positions: vec![vec![[0.0, 0.5, t as f32]; 3]],
             orientations: vec![vec![[0.0, 0.0, 0.0, 1.0]; 2]],
             shapes: vec![([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0])],
             grips: vec![Some([0.1, 0.2, 0.3]), None],
+            forces: Some(Forces {
+                tensions: vec![vec![0.5, 0.25 * t as f32]],
+                grips: vec![[0.0, 0.5, 0.0], [0.0; 3]],
+                contacts: vec![touch(Touched::Shape(0)), touch(Touched::Thread(OnThread { thread: 0, element: 1, s: 0.5 }))],
+            }),
         };
         Trajectory { header, frames: vec![frame(0.0), frame(0.5)] }
     }
@@ -405,6 +574,32 @@ mod tests {
         let t = sample();
         assert_eq!(Trajectory::from_bytes(&t.to_bytes()).unwrap(), t);
         assert_eq!(t.nearest(0.4).unwrap().time, 0.5);
+    }
+
+    #[test]
+    fn recordings_without_forces_are_read() {
+        let mut t = sample();
+        t.frames[1].forces = None;
+        assert_eq!(Trajectory::from_bytes(&t.to_bytes()).unwrap(), t);
+        // Version 1 ends a frame with its grips.
+        t.frames.truncate(1);
+        let (bytes, forces) = (t.to_bytes(), 4 + 8 + 24 + 4 + 2 * CONTACT);
+        t.frames[0].forces = None;
+        let mut old = bytes[..bytes.len() - 4 - forces].to_vec();
+        old[8] = 1;
+        old.extend_from_slice(&crc32fast::hash(&old).to_le_bytes());
+        assert_eq!(Trajectory::from_bytes(&old).unwrap(), t);
+    }
+
+    #[test]
+    fn contacts_of_what_is_not_there_are_refused() {
+        let away = |change: &dyn Fn(&mut Contact)| {
+            let mut t = sample();
+            change(&mut t.frames[0].forces.as_mut().unwrap().contacts[0]);
+            Trajectory::from_bytes(&t.to_bytes()).is_err()
+        };
+        assert!(!away(&|_| ()));
+        assert!(away(&|c| c.with = Touched::Shape(1)) && away(&|c| c.on.element = 2) && away(&|c| c.on.thread = 1) && away(&|c| c.force[1] = f32::INFINITY));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::Path;
 use sutura::glam::{DQuat, DVec3, Mat4, Quat, Vec3, Vec4};
 use sutura::skin::{Bone, Skin, SkinSpec};
 use sutura::{Profile, Section};
-use sutura_scene::export::{ExportError, Exporter, Format, Live, Moment, Options, Strand};
+use sutura_scene::export::{ExportError, Exporter, Format, Loads, Moment, Options, Strand};
 use sutura_scene::{Header, Runner, Scene, ThreadLook, Trajectory};
 
 /// A thread that falls over a post, a ring closed with a twist that is no whole number of turns, and a bar that moves and turns.
@@ -288,12 +288,13 @@ fn vtk_has_curvature_and_twist_of_a_curve_that_is_known() {
             let along = (at(k as f64 + 1.0, radius) - at(k as f64, radius)).normalize();
             sutura::math::frame_from_tangent(along, DVec3::Z) * DQuat::from_rotation_z(rate * length * k as f64)
         };
-        let live = Live {
-            velocities: vec![DVec3::X; n + 1],
-            tensions: (0..n).map(|e| e as f64).collect(),
-            contact_forces: (0..=n).map(|i| DVec3::Y * i as f64).collect(),
-        };
-        Strand { positions: (0..=n).map(|k| at(k as f64, radius)).collect(), orientations: (0..n).map(frame).collect(), live: Some(live) }
+        let loads = Loads { tensions: (0..n).map(|e| e as f64).collect(), contact_forces: (0..=n).map(|i| DVec3::Y * i as f64).collect() };
+        Strand {
+            positions: (0..=n).map(|k| at(k as f64, radius)).collect(),
+            orientations: (0..n).map(frame).collect(),
+            velocities: Some(vec![DVec3::X; n + 1]),
+            loads: Some(loads),
+        }
     };
     let turned = rate * 2.0 * radius * (0.5 * std::f64::consts::TAU / n as f64).sin() * n as f64;
     for (angle, seam) in [(0.5 * std::f64::consts::PI, None), (std::f64::consts::TAU, Some(-turned))] {
@@ -327,18 +328,32 @@ fn vtk_has_curvature_and_twist_of_a_curve_that_is_known() {
 }
 
 #[test]
-fn a_run_under_way_tells_its_forces() {
+fn a_run_under_way_tells_its_forces_and_so_does_its_recording() {
     let mut runner = Runner::new(Scene::parse(SCENE, "three.toml").unwrap()).unwrap();
     while !runner.step_frame().finished {}
     let moment = Moment::of_runner(&runner);
     // Contacts between threads cancel, so what is left is what the shapes do: the weight of the thread that lies on the post, and more while it falls.
-    let live = moment.threads[0].live.as_ref().unwrap();
-    let sum: DVec3 = live.contact_forces.iter().sum();
+    let loads = moment.threads[0].loads.as_ref().unwrap();
+    let sum: DVec3 = loads.contact_forces.iter().sum();
     let all: DVec3 = runner.world().contacts().filter(|c| c.a.0 == 0).map(|c| c.force).sum();
     assert!(sum.z > 0.0 && (sum - all).length() < 1e-12 * all.length().max(1e-9), "{sum} {all}");
     let rod = runner.rods().next().unwrap();
-    assert_eq!(live.tensions[5], rod.tension(5));
-    assert_eq!(live.velocities, rod.velocities());
+    assert_eq!(loads.tensions[5], rod.tension(5));
+    assert_eq!(moment.threads[0].velocities.as_deref(), Some(rod.velocities()));
+    let recorded = Moment::of_frame(&runner.frame());
+    for (a, b) in recorded.threads.iter().zip(&moment.threads) {
+        let (a, b) = (a.loads.as_ref().unwrap(), b.loads.as_ref().unwrap());
+        let greatest = b.contact_forces.iter().map(|f| f.length()).fold(1e-9, f64::max);
+        assert!(a.tensions.iter().zip(&b.tensions).all(|(a, b)| *a == f64::from(*b as f32)));
+        assert!(a.contact_forces.iter().zip(&b.contact_forces).all(|(a, b)| (*a - *b).length() < 1e-6 * greatest));
+    }
+    // Nothing acts on the thread of the recording that does not act on that of the run, so all that it says of grips and contacts is there.
+    let forces = runner.frame().forces.unwrap();
+    assert_eq!(forces.contacts.len(), runner.world().contacts().count());
+    for ((_, handle), force) in runner.grips().zip(&forces.grips) {
+        let wrench = handle.map_or(DVec3::ZERO, |h| runner.world().grip_wrench(h).unwrap().force);
+        assert_eq!(wrench.as_vec3().to_array(), *force);
+    }
 }
 
 #[test]

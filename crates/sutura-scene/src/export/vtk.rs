@@ -157,14 +157,16 @@ fn fields_of(thread: &Thread, strand: &Strand) -> Vec<Field> {
         vector("d2", &director(DVec3::Y)),
         vector("d3", &director(DVec3::Z)),
     ];
-    if let Some(live) = &strand.live {
+    if let Some(loads) = &strand.loads {
         let mean = |i: usize| {
             let (a, b) = around(i);
-            0.5 * (live.tensions[a] + live.tensions[b])
+            0.5 * (loads.tensions[a] + loads.tensions[b])
         };
         fields.push(scalar("tension", &mean));
-        fields.push(vector("velocity", &|i| live.velocities[i]));
-        fields.push(vector("contact_force", &|i| live.contact_forces[i]));
+        fields.push(vector("contact_force", &|i| loads.contact_forces[i]));
+    }
+    if let Some(velocities) = &strand.velocities {
+        fields.push(vector("velocity", &|i| velocities[i]));
     }
     fields
 }

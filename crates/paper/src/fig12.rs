@@ -45,14 +45,14 @@ const LINEAR: &str = "direct, linear damping";
 const DEFAULT: &str = "direct, default step";
 
 fn plan() -> Plan {
-    let fine = Method::Direct(Direct { substeps: 100, integrator: Integrator::TrBdf2, inextensible: false, ..Direct::default() });
+    let fine = Method::Direct(Direct { substeps: 100, integrator: Integrator::TrBdf2, ..Direct::default() });
     let mut cases = Vec::new();
     for d in DAMPING {
         cases.push(Case { name: ANGULAR, method: fine.clone(), linear: 0.0, angular: d });
         cases.push(Case { name: LINEAR, method: fine.clone(), linear: d, angular: 0.0 });
         cases.push(Case { name: PAPER, method: Method::Paper(PaperSettings::default(), 1), linear: 0.0, angular: d });
     }
-    cases.push(Case { name: DEFAULT, method: Method::Direct(Direct { inextensible: false, ..Direct::default() }), linear: 0.0, angular: 0.0 });
+    cases.push(Case { name: DEFAULT, method: Method::Direct(Direct::default()), linear: 0.0, angular: 0.0 });
     Plan::new(cases, |c| format!("{}, {} and {}", c.name, c.linear, c.angular), simulate, finish)
 }
 

@@ -28,8 +28,6 @@ pub struct Direct {
     pub newton_max: u32,
     /// When a substep has converged \[rad\].
     pub tolerance: f64,
-    /// Whether lengths are constraints.
-    pub inextensible: bool,
     /// How it goes in time.
     pub integrator: Integrator,
 }
@@ -38,7 +36,7 @@ impl Default for Direct {
     /// As the engine has them: 240 substeps a second at 60 frames.
     fn default() -> Self {
         let s = Settings::default();
-        Direct { substeps: 4, newton_max: s.newton_max, tolerance: s.tolerance, inextensible: true, integrator: s.integrator }
+        Direct { substeps: 4, newton_max: s.newton_max, tolerance: s.tolerance, integrator: s.integrator }
     }
 }
 
@@ -105,8 +103,7 @@ impl Ours {
         let (settings, substeps, stretch) = match method {
             Method::Paper(p, n) => (Settings { solver: sutura::Solver::Paper(*p), ..base }, *n, Stretch::Elastic),
             Method::Direct(d) => {
-                let stretch = if d.inextensible { Stretch::Inextensible } else { Stretch::Elastic };
-                (Settings { newton_max: d.newton_max, tolerance: d.tolerance, integrator: d.integrator, ..base }, d.substeps, stretch)
+                (Settings { newton_max: d.newton_max, tolerance: d.tolerance, integrator: d.integrator, ..base }, d.substeps, Stretch::Inextensible)
             }
             _ => unreachable!("the others are no solvers of the engine"),
         };

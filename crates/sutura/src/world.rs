@@ -352,6 +352,9 @@ impl World {
         }
         let mass: f64 = places.iter().map(|p| model.mass[p.2]).sum();
         let velocity = places.iter().map(|p| state.velocity[p.2] * model.mass[p.2]).sum::<DVec3>() / mass;
+        if !velocity.is_finite() {
+            return Err(Error::invalid("weld", "places", velocity, "places of finite momentum"));
+        }
         let at = held.first().map_or(middle, |i| state.position[*i]);
         for (_, _, i) in places {
             (self.state.position[i], self.state.velocity[i]) = (at, velocity);

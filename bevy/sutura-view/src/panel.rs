@@ -191,8 +191,9 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
 }
 
 fn parameter_panel(world: &mut World, context: &egui::Context) {
-    let width = context.content_rect().width();
-    egui::Window::new("Parameters").default_pos([width - 290.0, 10.0]).default_width(265.0).default_open(false).vscroll(true).show(context, |ui| {
+    let size = context.content_rect().size();
+    let window = egui::Window::new("Parameters").default_pos([size.x - 290.0, 10.0]).default_width(265.0).default_height(size.y - 120.0);
+    window.default_open(false).vscroll(true).show(context, |ui| {
         if world.resource::<Stage>().recorded {
             ui.label("A recording: nothing to change.");
             return;

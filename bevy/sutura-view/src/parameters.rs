@@ -62,9 +62,9 @@ fn pairs(world: &Engine) -> Vec<(u32, u32)> {
     let mut surfaces: Vec<u32> = threads.iter().copied().chain(view.shapes().map(|s| s.surface)).collect();
     surfaces.sort_unstable();
     surfaces.dedup();
-    let after = |i: usize| surfaces[i..].iter().map(move |b| *b);
+    let all = surfaces.iter().enumerate().flat_map(|(i, a)| surfaces[i..].iter().map(|b| (*a, *b)));
     // Shapes do not touch each other.
-    surfaces.iter().enumerate().flat_map(|(i, a)| after(i).map(move |b| (*a, b))).filter(|(a, b)| threads.contains(a) || threads.contains(b)).collect()
+    all.filter(|(a, b)| threads.contains(a) || threads.contains(b)).collect()
 }
 
 /// Remembers how a scene that was opened has things.
@@ -146,7 +146,8 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
     for (name, rod) in &threads {
         let Ok(r) = engine.rod(*rod) else { continue };
         egui::CollapsingHeader::new(format!("Material of {name}")).default_open(threads.len() == 1).show(ui, |ui| {
-            ui.label(format!("{} thick, {} long, {} elements", readable(2.0 * r.radius(), "m", true), readable(r.rest_length(), "m", true), r.n_elements()));
+            let [thick, long] = [2.0 * r.radius(), r.rest_length()].map(|x| readable(1e3 * x, "mm", false));
+            ui.label(format!("{thick} thick, {long} long, {} elements", r.n_elements()));
             let (mut material, mut stretch) = (r.material().clone(), r.stretch());
             material_ui(ui, &mut material, &mut stretch);
             if material != *r.material() {

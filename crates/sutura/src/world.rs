@@ -59,10 +59,9 @@ impl World {
     /// Changes the settings, the solver among them.
     ///
     /// From [`Solver::Direct`] to [`Solver::Paper`] only where the world has nothing that the paper has not: an error says what it has. (Where such a
-    /// thing is inserted later, the steps say so.) Positions, velocities and poses go on; tensions, contact forces and the forces of grips end, and
-    /// what was plastic set is none. Back to the direct solver tensions are those of the strains that the paper's solver has left, lengths that are
-    /// constraints become so within the next substep, contacts are found anew with threads on the sides where they are now, and
-    /// what lies in each other parts.
+    /// thing comes later, the steps say so.) Positions, velocities and poses go on; tensions, contact forces and the forces of grips end.
+    /// Back to the direct solver tensions are those of the strains that the paper's solver has left, lengths that are constraints become so within the
+    /// next substep, contacts are found anew with threads on the sides where they are now, and what lies in each other parts.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
         settings.validate()?;
         let (before, after) = (self.model.settings.solver, settings.solver);

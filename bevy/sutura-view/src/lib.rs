@@ -6,6 +6,7 @@ pub mod control;
 pub mod keys;
 mod overlay;
 mod panel;
+pub mod parameters;
 pub mod source;
 pub mod stage;
 mod studio;
@@ -31,9 +32,10 @@ impl Plugin for ViewerPlugin {
     fn build(&self, app: &mut App) {
         app.add_plugins(SuturaPlugin::default());
         app.init_resource::<Viewer>().init_resource::<Stage>().init_resource::<Orbit>().init_resource::<Typing>();
-        app.init_resource::<panel::Curves>().init_resource::<panel::Knots>();
+        app.init_resource::<panel::Curves>().init_resource::<panel::Knots>().init_resource::<parameters::Parameters>();
         let keys = resource_exists::<ButtonInput<KeyCode>>;
         app.add_systems(PreUpdate, (control::read_keys, control::read_drops, control::act).chain().after(InputSystems).run_if(keys));
+        app.add_systems(PreUpdate, (parameters::remember, parameters::apply).chain().after(control::act));
         app.add_systems(
             PhysicsFrame,
             (control::drive.in_set(PhysicsSet::Drive).run_if(keys), (stage::remember, control::settle, panel::measure).chain().after(PhysicsSet::Step)),

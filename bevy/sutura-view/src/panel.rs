@@ -2,14 +2,15 @@
 
 use crate::control::{Typing, Viewer, go_to};
 use crate::keys::{Action, KEYS, OTHERS};
+use crate::parameters;
 use crate::source::Play;
 use crate::stage::{Prop, Stage};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Color32, RichText, Ui};
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 use std::collections::VecDeque;
+use sutura_bevy::sutura::Hold;
 use sutura_bevy::sutura::knot::{Ends, recognize};
-use sutura_bevy::sutura::{Friction, Hold, Integrator, Settings, Shear, Solver};
 use sutura_bevy::{Grip, Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
 use sutura_scene::samples;
 
@@ -190,22 +191,14 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
 }
 
 fn parameter_panel(world: &mut World, context: &egui::Context) {
-    let width = context.content_rect().width();
-    egui::Window::new("Parameters").default_pos([width - 290.0, 10.0]).default_width(265.0).default_open(false).vscroll(true).show(context, |ui| {
+    let size = context.content_rect().size();
+    let window = egui::Window::new("Parameters").default_pos([size.x - 290.0, 10.0]).default_width(265.0).default_height(size.y - 120.0);
+    window.default_open(false).vscroll(true).show(context, |ui| {
         if world.resource::<Stage>().recorded {
             ui.label("A recording: nothing to change.");
             return;
         }
-        let before = world.resource::<Sutura>().world().settings().clone();
-        let mut settings = before.clone();
-        settings_ui(ui, &mut settings);
-        if settings != before {
-            let result = world.resource_mut::<Sutura>().edit().set_settings(settings);
-            if let Err(e) = result {
-                world.resource_mut::<Viewer>().message = e.to_string();
-            }
-        }
-        friction_ui(ui, world);
+        parameters::show(ui, world);
         ui.collapsing("Hand", |ui| {
             let mut hand = world.resource_mut::<Hand>();
             ui.horizontal(|ui| {
@@ -217,95 +210,6 @@ fn parameter_panel(world: &mut World, context: &egui::Context) {
             ui.add(egui::Slider::new(&mut hand.force_limit, 0.01..=20.0).logarithmic(true).text("force limit [N]"));
             ui.add(egui::Slider::new(&mut world.resource_mut::<Viewer>().grip_speed, 0.001..=0.2).logarithmic(true).text("keys [m/s]"));
         });
-        material_ui(ui, world);
-    });
-}
-
-fn settings_ui(ui: &mut Ui, s: &mut Settings) {
-    egui::CollapsingHeader::new("Solver and damping").default_open(true).show(ui, |ui| {
-        ui.horizontal(|ui| {
-            ui.label("gravity");
-            for k in 0..3 {
-                ui.add(egui::DragValue::new(&mut s.gravity[k]).speed(0.05).range(-50.0..=50.0));
-            }
-        });
-        let mut substeps = (1.0 / s.substep).round();
-        if ui.add(egui::Slider::new(&mut substeps, 60.0..=4000.0).logarithmic(true).text("substeps a second")).changed() {
-            s.substep = 1.0 / substeps;
-        }
-        ui.add(egui::Slider::new(&mut s.newton_max, 1..=50).text("Newton iterations"));
-        ui.add(egui::Slider::new(&mut s.tolerance, 1e-5..=0.1).logarithmic(true).text("tolerance [rad]"));
-        ui.add(egui::Slider::new(&mut s.halvings, 0..=12).text("halvings"));
-        ui.add(egui::Slider::new(&mut s.linear_damping, 0.0..=0.999).text("linear damping"));
-        ui.add(egui::Slider::new(&mut s.angular_damping, 0.0..=0.999).text("angular damping"));
-        ui.horizontal(|ui| {
-            ui.selectable_value(&mut s.integrator, Integrator::ImplicitEuler, "implicit Euler");
-            ui.selectable_value(&mut s.integrator, Integrator::TrBdf2, "TR-BDF2");
-        });
-        ui.label(match s.solver {
-            Solver::Direct => "solver: direct (fixed when the scene is made)",
-            Solver::Paper(_) => "solver: that of the paper (fixed when the scene is made)",
-        });
-    });
-}
-
-fn friction_ui(ui: &mut Ui, world: &mut World) {
-    ui.collapsing("Friction", |ui| {
-        let view = world.resource::<Sutura>().world().view();
-        let mut surfaces: Vec<u32> = view.rods().map(|r| r.surface()).chain(view.shapes().map(|s| s.surface)).collect();
-        let threads: Vec<u32> = view.rods().map(|r| r.surface()).collect();
-        surfaces.sort_unstable();
-        surfaces.dedup();
-        for (i, a) in surfaces.iter().enumerate() {
-            // Shapes do not touch each other.
-            for b in surfaces[i..].iter().filter(|b| threads.contains(a) || threads.contains(b)) {
-                let before = world.resource::<Sutura>().world().friction(*a, *b);
-                let mut now = before;
-                ui.label(format!("surfaces {a} and {b}"));
-                ui.add(egui::Slider::new(&mut now.stick, 0.0..=1.0).text("sticking"));
-                ui.add(egui::Slider::new(&mut now.slide, 0.0..=1.0).text("sliding"));
-                if now != before {
-                    // What slides holds no better than what sticks.
-                    let now = Friction { stick: now.stick, slide: now.slide.min(now.stick) };
-                    let result = world.resource_mut::<Sutura>().edit().set_friction(*a, *b, now);
-                    if let Err(e) = result {
-                        world.resource_mut::<Viewer>().message = e.to_string();
-                    }
-                }
-            }
-        }
-    });
-}
-
-/// What threads are made of: fixed when they are made, so it is shown and not changed.
-fn material_ui(ui: &mut Ui, world: &World) {
-    ui.collapsing("Material (fixed when the scene is made)", |ui| {
-        let world = world.resource::<Sutura>().world();
-        for rod in world.view().rods() {
-            let m = rod.material();
-            ui.label(RichText::new(format!("thread {}", rod.slot())).strong());
-            egui::Grid::new(rod.slot()).num_columns(2).show(ui, |ui| {
-                let mut row = |name: &str, value: String| {
-                    ui.label(name);
-                    ui.label(value);
-                    ui.end_row();
-                };
-                row("radius", format!("{:.4} mm", 1e3 * rod.radius()));
-                row("length", format!("{:.1} mm, {} elements", 1e3 * rod.rest_length(), rod.n_elements()));
-                row("Young's modulus", format!("{:.3} GPa", 1e-9 * m.young_modulus));
-                row(
-                    "shear",
-                    match m.shear {
-                        Shear::Poisson(nu) => format!("Poisson's ratio {nu}"),
-                        Shear::Modulus(g) => format!("{:.3} GPa", 1e-9 * g),
-                    },
-                );
-                row("density", format!("{} kg/m³", m.density));
-                row("bending scale", format!("{}", m.bend_scale));
-                row("bending damping", format!("{} s", m.bend_damping));
-                row("plastic set", m.plasticity.as_ref().map_or("none".into(), |p| format!("from {:.0} 1/m on", p.yield_curvature)));
-            });
-        }
     });
 }
 

@@ -7,11 +7,13 @@ use bevy::time::TimeUpdateStrategy;
 use bevy::window::FileDragAndDrop;
 use std::time::Duration;
 use sutura_bevy::sutura::glam::DVec3;
-use sutura_bevy::sutura::input::Recording;
+use sutura_bevy::sutura::input::{Input, Recording};
+use sutura_bevy::sutura::{Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Solver, Stretch, World as Engine};
 use sutura_bevy::{Grip, Hand, Held, Live, PhysicsClock, Pointer, Space, Sutura};
 use sutura_view::ViewerPlugin;
 use sutura_view::control::{Viewer, open};
 use sutura_view::keys::{DRIVE, KEYS};
+use sutura_view::parameters::{Change, Parameters};
 use sutura_view::source::Play;
 use sutura_view::stage::Stage;
 
@@ -153,16 +155,91 @@ fn a_hand_in_a_scene_is_recorded_with_it_and_done_again() {
     assert!(most > 0.0);
     look(&mut app, at, false);
     assert_eq!(app.world().resource::<Hand>().held, None);
-    // The file of what was done gives the same state.
-    press(&mut app, KeyCode::Space);
-    press(&mut app, KeyCode::F5);
-    let file = std::fs::read_dir(folder.path()).unwrap().filter_map(Result::ok).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
+    assert_done_again(&mut app, folder.path());
+}
+
+/// The file of what was done, written by its key, gives the same state.
+fn assert_done_again(app: &mut App, folder: &std::path::Path) -> Recording {
+    press(app, KeyCode::Space);
+    press(app, KeyCode::F5);
+    let file = std::fs::read_dir(folder).unwrap().filter_map(Result::ok).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
     let bytes = std::fs::read(file.unwrap()).unwrap();
-    let again = Recording::from_bytes(&bytes).unwrap().replay(&mut |step| {
+    let recording = Recording::from_bytes(&bytes).unwrap();
+    let again = recording.replay(&mut |step| {
         assert!(step.is_same(), "step {}", step.step);
         std::ops::ControlFlow::Continue(())
     });
     assert_eq!(again.unwrap().state_hash(), app.world().resource::<Sutura>().world().state_hash());
+    recording
+}
+
+fn engine(app: &App) -> &Engine {
+    app.world().resource::<Sutura>().world()
+}
+
+fn first_thread(app: &App) -> Handle<Rod> {
+    app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.threads().next().unwrap().1
+}
+
+/// What the panel does, and some frames after it.
+fn change(app: &mut App, changes: Vec<Change>) {
+    app.world_mut().resource_mut::<Parameters>().wanted.extend(changes);
+    for _ in 0..10 {
+        app.update();
+    }
+}
+
+#[test]
+fn what_is_changed_while_it_runs_is_recorded_and_done_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("free_thread", folder.path());
+    change(&mut app, vec![]);
+    let rod = first_thread(&app);
+    let (settings, material) = (engine(&app).settings().clone(), engine(&app).rod(rod).unwrap().material().clone());
+    let lowest = |app: &App| engine(app).rod(rod).unwrap().positions().iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+    let plastic = Plasticity { yield_curvature: 50.0, yield_twist: 80.0, hardening: 0.1 };
+    let soft = Material { young_modulus: 0.1 * material.young_modulus, density: 3.0 * material.density, ..material.clone() };
+    change(&mut app, vec![Change::Material(rod, soft.clone()), Change::Friction(0, 0, Friction::coulomb(0.7))]);
+    assert_eq!(engine(&app).rod(rod).unwrap().material(), &soft);
+    assert_eq!(engine(&app).friction(0, 0), Friction::coulomb(0.7));
+    let other = if engine(&app).rod(rod).unwrap().stretch() == Stretch::Elastic { Stretch::Inextensible } else { Stretch::Elastic };
+    change(&mut app, vec![Change::Stretch(rod, other)]);
+    assert_eq!(engine(&app).rod(rod).unwrap().stretch(), other);
+    let paper = Settings { solver: Solver::Paper(PaperSettings::default()), integrator: Integrator::TrBdf2, ..settings.clone() };
+    change(&mut app, vec![Change::Settings(paper.clone())]);
+    assert_eq!(engine(&app).settings(), &paper);
+    let low = lowest(&app);
+    change(&mut app, vec![]);
+    assert_ne!(lowest(&app), low, "it moves");
+    change(&mut app, vec![Change::Settings(Settings { integrator: Integrator::TrBdf2, ..settings.clone() })]);
+    change(&mut app, vec![Change::Material(rod, Material { plasticity: Some(plastic), bend_damping: 0.01, ..soft.clone() })]);
+    // Refused: it says why, and nothing changes, nor is what follows it done.
+    let before = engine(&app).settings().clone();
+    app.world_mut().resource_mut::<PhysicsClock>().running = false;
+    let hash = engine(&app).state_hash();
+    change(&mut app, vec![Change::Settings(paper), Change::Material(rod, material.clone())]);
+    let error = app.world().resource::<Parameters>().error.clone().unwrap();
+    assert!(error.contains("plastic set"), "{error}");
+    change(&mut app, vec![Change::Material(rod, Material { density: -1.0, ..material.clone() })]);
+    let error = app.world().resource::<Parameters>().error.clone().unwrap();
+    assert!(error.contains("density"), "{error}");
+    assert_eq!((engine(&app).settings(), engine(&app).state_hash()), (&before, hash));
+    // Everything back.
+    let changed = app.world().resource::<Parameters>().changed(engine(&app));
+    assert_eq!(changed.len(), 4, "{changed:?}");
+    app.world_mut().resource_mut::<PhysicsClock>().running = true;
+    change(&mut app, changed);
+    assert_eq!(app.world().resource::<Parameters>().error, None);
+    assert!(app.world().resource::<Parameters>().changed(engine(&app)).is_empty());
+    assert_eq!((engine(&app).settings(), engine(&app).rod(rod).unwrap().material()), (&settings, &material));
+    let recording = assert_done_again(&mut app, folder.path());
+    let count = |of: fn(&Input) -> bool| recording.inputs.iter().filter(|i| of(i)).count();
+    assert_eq!(count(|i| matches!(i, Input::SetMaterial(..))), 3);
+    assert_eq!(count(|i| matches!(i, Input::SetStretch(..))), 2);
+    // Another scene has its own.
+    open(app.world_mut(), "capstan");
+    app.update();
+    assert!(app.world().resource::<Parameters>().changed(engine(&app)).is_empty());
 }
 
 #[test]

@@ -4,8 +4,9 @@ use crate::finite;
 use crate::input::Input;
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, Load, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile,
-    Reel, ReelLaw, ReelSpec, RestShape, Rod, RodSpec, Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Stretch, Weld, WeldRest, WeldSpec, World,
+    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, Load, LoadKind, LoadSpec, Material, PaperSettings, Place, Plasticity,
+    Pose, Profile, Reel, ReelLaw, ReelSpec, RestShape, Rod, RodSpec, Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, Weld, WeldRest,
+    WeldSpec, World,
 };
 
 /// What one input may do: edits, threads, elements of one, substeps in all.
@@ -171,7 +172,31 @@ impl Session {
                     self.rods.extend(self.world.insert_rod(&RodSpec { closure, stretch, rest, ..spec }));
                 }
             }
+            254 => self.remake(input),
             _ => self.step(input),
+        }
+    }
+
+    /// What a thread is made of, whether it stretches, and which solver steps all of them.
+    fn remake(&mut self, input: &mut Input<'_>) {
+        match input.below(4) {
+            0 => {
+                if let Some(rod) = pick(&self.rods, input) {
+                    let _ = self.world.set_stretch(rod, input.pick(&[Stretch::Elastic, Stretch::Inextensible]));
+                }
+            }
+            1 => {
+                let paper = PaperSettings { iterations: 1 + input.below(5) as u32, direct_distance: input.truth(), ..PaperSettings::default() };
+                let solver = input.pick(&[Solver::Direct, Solver::Paper(paper)]);
+                let _ = self.world.set_settings(Settings { solver, ..self.world.settings().clone() });
+            }
+            _ => {
+                if let Some(rod) = pick(&self.rods, input) {
+                    let mut material = Material::elastic(input.size(1e9), input.size(1e3));
+                    odd_material(&mut material, input.byte(), input);
+                    let _ = self.world.set_material(rod, &material);
+                }
+            }
         }
     }
 
@@ -238,15 +263,7 @@ impl Session {
             let profile = |input: &mut Input<'_>| Profile(vec![(0.0, input.size(1.0)), (input.size(1e-3), input.size(1.0))]);
             spec.along = Along { size: profile(input), modulus: profile(input), density: profile(input) };
         }
-        if odd & 16 != 0 {
-            material.shear = if input.truth() { Shear::Poisson(input.number(0.2)) } else { Shear::Modulus(input.size(1e9)) };
-            material.bend_scale = input.size(0.2);
-            material.bend_damping = input.size(0.01);
-        }
-        if odd & 32 != 0 {
-            let (yield_curvature, yield_twist, hardening) = (input.size(200.0), input.size(200.0), input.size(0.1));
-            material.plasticity = Some(Plasticity { yield_curvature, yield_twist, hardening });
-        }
+        odd_material(&mut material, odd, input);
         if odd & 64 != 0 {
             spec.frames = Some((0..n).map(|_| input.rotation()).collect());
         }
@@ -318,6 +335,19 @@ impl Session {
                 assert_eq!(rod.positions().len(), rod.n_elements() + 1);
             }
         }
+    }
+}
+
+/// A material with more to it than stiffness and mass.
+fn odd_material(material: &mut Material, odd: u8, input: &mut Input<'_>) {
+    if odd & 16 != 0 {
+        material.shear = if input.truth() { Shear::Poisson(input.number(0.2)) } else { Shear::Modulus(input.size(1e9)) };
+        material.bend_scale = input.size(0.2);
+        material.bend_damping = input.size(0.01);
+    }
+    if odd & 32 != 0 {
+        let (yield_curvature, yield_twist, hardening) = (input.size(200.0), input.size(200.0), input.size(0.1));
+        material.plasticity = Some(Plasticity { yield_curvature, yield_twist, hardening });
     }
 }
 

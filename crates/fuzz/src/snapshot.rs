@@ -11,6 +11,8 @@ use sutura::{
 
 /// The worlds, and snapshots of them after some steps.
 const WORLDS: [fn() -> Result<World, Error>; 3] = [simple, busy, joined];
+/// Length of the head of a snapshot: version, and what threads are made of.
+const MADE_OF: usize = 16;
 static SNAPSHOTS: OnceLock<[Vec<u8>; 3]> = OnceLock::new();
 
 pub fn run(data: &[u8]) {
@@ -20,7 +22,7 @@ pub fn run(data: &[u8]) {
         b => usize::from(b & 1),
     };
     let good = &SNAPSHOTS.get_or_init(|| [stepped(0), stepped(1), stepped(2)])[which];
-    take_up(which, &input.changed(good));
+    take_up(which, &input.changed(good), good);
 }
 
 fn world(which: usize) -> World {
@@ -36,14 +38,17 @@ fn stepped(which: usize) -> Vec<u8> {
     world.snapshot()
 }
 
-fn take_up(which: usize, bytes: &[u8]) {
+fn take_up(which: usize, bytes: &[u8], good: &[u8]) {
     let mut world = world(which);
     let before = world.state_hash();
     if world.restore(bytes).is_err() {
         assert_eq!(world.state_hash(), before, "a snapshot that was refused changed the world");
         return;
     }
-    assert_eq!(world.snapshot(), bytes, "what was read is not what was written");
+    // Of threads that are made of something else it takes what it can.
+    if bytes.get(..MADE_OF) == good.get(..MADE_OF) {
+        assert_eq!(world.snapshot(), bytes, "what was read is not what was written");
+    }
     finite::assert(finite::readings(&world));
     for _ in 0..2 {
         let report = world.step(1.0 / 240.0);

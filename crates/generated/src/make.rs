@@ -491,7 +491,16 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
         41 => scene.settings.integrator = Integrator::TrBdf2,
         _ => {
             let drive = Drive::Force { direction: d.direction(), force: x, speed_limit: 1.0 };
-            scene.acts.push((when, if d.chance(0.5) { Act::Drive(0, drive) } else { Act::GripPose(0, Pose::new(d.vector(x), d.turn())) }));
+            let act = match d.whole(0, 3) {
+                0 => Act::Drive(0, drive),
+                1 => Act::GripPose(0, Pose::new(d.vector(x), d.turn())),
+                2 => {
+                    let Material { young_modulus, density, .. } = rod.material;
+                    Act::Material(number, Material { young_modulus: young_modulus * x, density: density * wild(d), ..rod.material.clone() })
+                }
+                _ => Act::Stretch(number, if d.chance(0.5) { Stretch::Elastic } else { Stretch::Inextensible }),
+            };
+            scene.acts.push((when, act));
         }
     }
 }

@@ -166,6 +166,8 @@ impl<'a> Player<'a> {
         let done = match act {
             Act::RemoveRod(i) => self.rods.get_mut(*i).and_then(Option::take).map(|rod| self.world.remove_rod(rod)),
             Act::InsertRod(spec) => Some(self.world.insert_rod(spec).map(|rod| self.rods.push(Some(rod)))),
+            Act::Material(i, material) => self.rod(*i).map(|rod| self.world.set_material(rod, material)),
+            Act::Stretch(i, stretch) => self.rod(*i).map(|rod| self.world.set_stretch(rod, *stretch)),
             Act::RemoveShape(i) => self.shapes.get_mut(*i).and_then(Option::take).map(|shape| self.world.remove_shape(shape)),
             Act::ShapePose(i, pose) => self.shapes.get(*i).copied().flatten().map(|shape| self.world.set_shape_pose(shape, *pose)),
             Act::Settings(settings) => Some(self.world.set_settings(settings.clone())),

@@ -1,7 +1,7 @@
 //! A scene as data: what is inserted, how grips move, and what is done at which frame.
 
 use sutura::glam::DVec3;
-use sutura::{Drive, Friction, Hold, LoadKind, Place, Pose, ReelLaw, RodSpec, Settings, ShapeSpec, WeldRest};
+use sutura::{Drive, Friction, Hold, LoadKind, Material, Place, Pose, ReelLaw, RodSpec, Settings, ShapeSpec, Stretch, WeldRest};
 
 /// A scene.
 #[derive(Debug, Clone)]
@@ -88,6 +88,10 @@ pub enum Act {
     RemoveRod(usize),
     /// A thread is inserted.
     InsertRod(Box<RodSpec>),
+    /// A thread is made of something else.
+    Material(usize, Material),
+    /// A thread stretches or does not.
+    Stretch(usize, Stretch),
     /// A shape is removed.
     RemoveShape(usize),
     /// A driven shape is to go there.

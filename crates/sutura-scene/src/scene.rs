@@ -7,7 +7,7 @@ use crate::motion::Plan;
 use crate::units::Unit;
 use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
-use sutura::{Friction, Hold, Place, ReelLaw, RodSpec, Settings, ShapeSpec, WeldRest};
+use sutura::{Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch, WeldRest};
 
 /// Most frames of a run: two days at 60 a second. What is recorded and probed is kept in memory.
 pub(crate) const MOST_FRAMES: f64 = 1e7;
@@ -163,6 +163,37 @@ pub(crate) enum Action {
         b: u32,
         friction: Friction,
     },
+    Remake {
+        thread: usize,
+        change: Remake,
+    },
+}
+
+/// What changes of what a thread is made of; the rest stays.
+#[derive(Debug, Clone)]
+pub(crate) struct Remake {
+    pub young_modulus: Option<f64>,
+    pub shear: Option<Shear>,
+    pub density: Option<f64>,
+    pub bend_scale: Option<f64>,
+    pub bend_damping: Option<f64>,
+    /// `Some(None)` makes it elastic.
+    pub plasticity: Option<Option<Plasticity>>,
+    pub stretch: Option<Stretch>,
+}
+
+impl Remake {
+    /// The material that comes of another one.
+    pub fn of(&self, before: &Material) -> Material {
+        Material {
+            young_modulus: self.young_modulus.unwrap_or(before.young_modulus),
+            shear: self.shear.unwrap_or(before.shear),
+            density: self.density.unwrap_or(before.density),
+            bend_scale: self.bend_scale.unwrap_or(before.bend_scale),
+            bend_damping: self.bend_damping.unwrap_or(before.bend_damping),
+            plasticity: self.plasticity.unwrap_or(before.plasticity),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -316,6 +316,12 @@ impl Stage {
             }
             Action::Reel { reel, law } => self.world.set_reel(self.reels[*reel], *law),
             Action::Friction { a, b, friction } => self.world.set_friction(*a, *b, *friction),
+            Action::Remake { thread, change } => {
+                let rod = self.threads[*thread];
+                let material = change.of(self.world.rod(rod)?.material());
+                self.world.set_material(rod, &material)?;
+                change.stretch.map_or(Ok(()), |stretch| self.world.set_stretch(rod, stretch))
+            }
         }
     }
 

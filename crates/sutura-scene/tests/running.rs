@@ -141,6 +141,67 @@ tolerance = "1 %"
     assert!(along.to_csv().starts_with("arc [m],x [m],y [m],z [m],tension [N]\n0.00"));
 }
 
+/// E A of the thread is 141.37 N: 1 N stretches it by 0.70736 %, and at a quarter of the modulus by four times as much.
+#[test]
+fn a_phase_changes_what_a_thread_is_made_of() {
+    let out = run(&format!(
+        r#"{HANGING}
+[[load]]
+name = "weight"
+at = "end"
+force = "[0, 0, -1] N"
+[[phase]]
+name = "stiff"
+duration = "0.5 s"
+[[phase]]
+name = "soft"
+duration = "0.5 s"
+action = [{{ material = "rod", young_modulus = "0.5 GPa", shear_modulus = "0.2 GPa", density = "1200 kg/m^3", bend_scale = 0.5, bend_damping = "1 ms", plasticity = {{ yield_curvature = "200 1/m" }} }}]
+[[phase]]
+name = "long"
+duration = "0.5 s"
+action = [{{ material = "rod", stretch = "inextensible", plasticity = "none" }}]
+[[check]]
+that = "elongation(rod)"
+after = "stiff"
+equals = 0.0070736
+tolerance = "0.1 %"
+[[check]]
+that = "elongation(rod)"
+after = "soft"
+equals = 0.0282942
+tolerance = "0.1 %"
+[[check]]
+that = "elongation(rod)"
+at_most = 0.00001
+[[check]]
+that = "tension(rod.middle)"
+equals = "1 N"
+tolerance = "0.1 %"
+"#
+    ));
+    assert!(out.report.passed, "{:?}", out.report.checks);
+}
+
+#[test]
+fn what_an_action_does_not_name_of_a_material_stays() {
+    let text = format!(
+        r#"{HANGING}
+[[phase]]
+duration = "50 ms"
+action = [{{ material = "rod", density = "1200 kg/m^3" }}, {{ material = "rod", poisson_ratio = 0.2, plasticity = {{ yield_curvature = 200, hardening = 0.1 }} }}]
+"#
+    );
+    let mut runner = Runner::new(Scene::parse(&text, "test.toml").unwrap()).unwrap();
+    runner.step_frame();
+    let rod = runner.world().view().rods().next().unwrap();
+    let m = rod.material();
+    assert_eq!((m.young_modulus, m.density, m.shear), (2e9, 1200.0, sutura::Shear::Poisson(0.2)));
+    let p = m.plasticity.unwrap();
+    assert_eq!((p.yield_curvature, p.yield_twist, p.hardening), (200.0, 200.0, 0.1));
+    assert_eq!((m.bend_scale, m.bend_damping), (1.0, 0.0));
+}
+
 #[test]
 fn a_check_that_fails_says_what_it_found() {
     let out = run(&format!(

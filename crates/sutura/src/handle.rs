@@ -105,4 +105,7 @@ impl<T> Slots<T> {
     pub(crate) fn at(&self, index: u32) -> Option<&T> {
         self.slots.get(index as usize).and_then(|(_, v)| v.as_ref())
     }
+    pub(crate) fn at_mut(&mut self, index: u32) -> Option<&mut T> {
+        self.slots.get_mut(index as usize).and_then(|(_, v)| v.as_mut())
+    }
 }

@@ -34,6 +34,10 @@ pub enum Input {
     InsertRod(RodSpec),
     /// [`World::remove_rod`].
     RemoveRod(Handle<Rod>),
+    /// [`World::set_material`].
+    SetMaterial(Handle<Rod>, Material),
+    /// [`World::set_stretch`].
+    SetStretch(Handle<Rod>, Stretch),
     /// [`World::insert_shape`].
     InsertShape(ShapeSpec),
     /// [`World::remove_shape`].
@@ -78,6 +82,8 @@ impl Input {
             Input::Friction(a, b, friction) => world.set_friction(*a, *b, *friction)?,
             Input::InsertRod(spec) => drop(world.insert_rod(spec)?),
             Input::RemoveRod(rod) => world.remove_rod(*rod)?,
+            Input::SetMaterial(rod, material) => world.set_material(*rod, material)?,
+            Input::SetStretch(rod, stretch) => world.set_stretch(*rod, *stretch)?,
             Input::InsertShape(spec) => drop(world.insert_shape(spec)?),
             Input::RemoveShape(shape) => world.remove_shape(*shape)?,
             Input::ShapePose(shape, pose) => world.set_shape_pose(*shape, *pose)?,
@@ -143,6 +149,10 @@ impl Recorder {
         insert_rod(spec: &RodSpec) -> Handle<Rod>, Input::InsertRod(spec.clone());
         /// [`World::remove_rod`].
         remove_rod(rod: Handle<Rod>) -> (), Input::RemoveRod(rod);
+        /// [`World::set_material`].
+        set_material(rod: Handle<Rod>, material: &Material) -> (), Input::SetMaterial(rod, material.clone());
+        /// [`World::set_stretch`].
+        set_stretch(rod: Handle<Rod>, stretch: Stretch) -> (), Input::SetStretch(rod, stretch);
         /// [`World::insert_shape`].
         insert_shape(spec: &ShapeSpec) -> Handle<Shape>, Input::InsertShape(spec.clone());
         /// [`World::remove_shape`].
@@ -238,9 +248,10 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version.
+/// First bytes of a recording: name and version. Version 2 is the same without the inputs 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
+const OLDEST: u32 = 2;
 
 impl Recording {
     /// Does everything again in a world of its own; `watch` sees it after every step and may stop there. An error is that of an input that
@@ -294,8 +305,8 @@ impl Recording {
             return Err(damaged("it is no recording of input (it does not begin with SUTURAIN)"));
         }
         let version = u32::take(&mut input)?;
-        if version != VERSION {
-            return Err(damaged(format!("recording of version {version}, this build reads version {VERSION}")));
+        if !(OLDEST..=VERSION).contains(&version) {
+            return Err(damaged(format!("recording of version {version}, this build reads versions {OLDEST} to {VERSION}")));
         }
         let inputs = Vec::take(&mut input)?;
         if !input.left.is_empty() {
@@ -389,4 +400,6 @@ variants!(Input {
     18 => RemoveWeld(weld),
     19 => InsertReel(spec),
     20 => SetReel(reel, law),
+    21 => SetMaterial(rod, material),
+    22 => SetStretch(rod, stretch),
 });

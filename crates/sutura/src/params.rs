@@ -38,7 +38,7 @@ pub enum Solver {
     Direct,
     /// That of the 2018 paper, kept as published for comparison. Of the other settings it uses gravity, substep (one step a frame is the paper's) and
     /// damping; of a thread its geometry, rest shape and mass. It knows no forces. Welds, reels, plastic set, and grips and shapes driven by force are not in it:
-    /// then nothing moves and the report says so.
+    /// then nothing moves and the report says so; [`World::set_settings`](crate::World::set_settings) does not switch to it where they are.
     Paper(PaperSettings),
 }
 

@@ -141,10 +141,10 @@ fn added(state: &State, rod: u32, at_end: bool) -> i32 {
     state.reels.iter().map(|(_, r)| r).find(|r| r.rod == rod && r.at_end == at_end).map_or(0, |r| r.added)
 }
 
-/// Whether a reel can work on a rod: elements at its ends are cut and joined as if they were all alike.
+/// Whether a reel can work on a rod: elements at its ends are cut and joined as if they were all alike, of whatever material.
 pub(crate) fn suits(model: &Model, rod: &RodModel) -> bool {
     let first = rod.first as usize;
-    rod.n_elements >= 2 && rod.elements().all(|k| model.section[k] == model.section[first] && model.rest_half[k] == glam::DQuat::IDENTITY)
+    rod.n_elements >= 2 && rod.elements().all(|k| model.factors[k] == model.factors[first] && model.rest_half[k] == glam::DQuat::IDENTITY)
 }
 
 /// Whether a state read from outside has lengths and reels that the model, which now fits the state `from`, can be made to fit.
@@ -218,6 +218,7 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
         mass,
         rod_of,
         rest_length,
+        factors,
         section,
         inertia,
         joint_length,
@@ -232,7 +233,7 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! again {
         ($($array:ident),*) => {$( let v = $array[e].clone(); $array.insert(e + 1, v); )*};
     }
-    again!(mass, rod_of, rest_length, section, inertia, joint_length, stretch_stiffness, inextensible, offset, bend_stiffness, bend_damping);
+    again!(mass, rod_of, rest_length, factors, section, inertia, joint_length, stretch_stiffness, inextensible, offset, bend_stiffness, bend_damping);
     rest_half.insert(e + 1, glam::DQuat::IDENTITY);
     shift_model(rods, rod, e, 1);
     for (_, weld) in model.welds.iter_mut() {
@@ -251,6 +252,7 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
         mass,
         rod_of,
         rest_length,
+        factors,
         section,
         inertia,
         joint_length,
@@ -265,7 +267,21 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! without {
         ($($array:ident),*) => {$( $array.remove(e + 1); )*};
     }
-    without!(mass, rod_of, rest_length, section, inertia, joint_length, rest_half, stretch_stiffness, inextensible, offset, bend_stiffness, bend_damping);
+    without!(
+        mass,
+        rod_of,
+        rest_length,
+        factors,
+        section,
+        inertia,
+        joint_length,
+        rest_half,
+        stretch_stiffness,
+        inextensible,
+        offset,
+        bend_stiffness,
+        bend_damping
+    );
     shift_model(rods, rod, e, -1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {

@@ -3,13 +3,18 @@
 use crate::error::Error;
 use crate::handle::Slots;
 use crate::math::Pose;
+use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
 use crate::model::reel::ReelLaw;
 use crate::state::{GripState, LoadState, Onset, ReelState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
-/// First bytes of a snapshot: name and version.
-const MAGIC: &[u8; 8] = b"sutura\x03\0";
+/// First bytes of a snapshot: name and version. What its threads were made of follows, and the state.
+const MAGIC: &[u8; 8] = b"sutura\x04\0";
+
+/// Those of version 3, which does not say what threads were made of. The hash of a state begins with them, whatever the version, so that states of builds
+/// that differ in nothing else can be compared.
+const BARE: &[u8; 8] = b"sutura\x03\0";
 
 /// Something that is written and read back without loss.
 pub(crate) trait Bytes: Sized {
@@ -208,25 +213,47 @@ structure!(State {
     shape_contacts,
 });
 
-pub(crate) fn write(state: &State) -> Vec<u8> {
+/// A snapshot of the state of a model.
+pub(crate) fn write(state: &State, made_of: u64) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
+    made_of.put(&mut out);
     state.put(&mut out);
     out
 }
 
-pub(crate) fn read(bytes: &[u8]) -> Result<State, Error> {
+/// What threads were made of, where the snapshot says so, and the state.
+pub(crate) fn read(bytes: &[u8]) -> Result<(Option<u64>, State), Error> {
     let mut input = Reader { left: bytes };
-    if &input.array::<8>()? != MAGIC {
-        return Err(damaged("it does not start as a snapshot of this version"));
-    }
+    let made_of = match &input.array::<8>()? {
+        MAGIC => Some(u64::take(&mut input)?),
+        BARE => None,
+        _ => return Err(damaged("it does not start as a snapshot of this version")),
+    };
     let state = State::take(&mut input)?;
     if !input.left.is_empty() {
         return Err(damaged(format!("{} bytes too many", input.left.len())));
     }
-    Ok(state)
+    Ok((made_of, state))
 }
 
-/// FNV-1a over the snapshot's bytes.
+/// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a state are of these.
+pub(crate) fn made_of(model: &Model) -> u64 {
+    let mut bytes = Vec::new();
+    for (slot, rod) in model.rods.iter() {
+        slot.put(&mut bytes);
+        rod.material.put(&mut bytes);
+        rod.stretch.put(&mut bytes);
+    }
+    fnv(&bytes)
+}
+
+/// FNV-1a over the bytes of the state.
 pub(crate) fn hash(state: &State) -> u64 {
-    write(state).iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
+    let mut bytes = BARE.to_vec();
+    state.put(&mut bytes);
+    fnv(&bytes)
+}
+
+fn fnv(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }

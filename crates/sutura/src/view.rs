@@ -3,7 +3,7 @@
 use crate::math::{Pose, log};
 use crate::model::Model;
 use crate::model::material::{Material, SectionStiffness};
-use crate::model::rod::RodModel;
+use crate::model::rod::{RodModel, Stretch};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
@@ -169,6 +169,10 @@ impl<'a> RodView<'a> {
     /// What it is made of.
     pub fn material(&self) -> &'a Material {
         &self.rod.material
+    }
+    /// Whether it stretches.
+    pub fn stretch(&self) -> Stretch {
+        self.rod.stretch
     }
     /// Its surface for friction.
     pub fn surface(&self) -> u32 {

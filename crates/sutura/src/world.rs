@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
+use crate::model::material::Material;
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
@@ -55,11 +56,26 @@ impl World {
     pub fn settings(&self) -> &Settings {
         &self.model.settings
     }
-    /// Changes the settings.
+    /// Changes the settings, the solver among them.
+    ///
+    /// From [`Solver::Direct`] to [`Solver::Paper`] only where the world has nothing that the paper has not: an error says what it has. (Where such a
+    /// thing comes later, the steps say so.) Positions, velocities and poses go on; tensions, contact forces and the forces of grips end.
+    /// Back to the direct solver tensions are those of the strains that the paper's solver has left, lengths that are constraints become so within the
+    /// next substep, contacts are found anew with threads on the sides where they are now, and what lies in each other parts.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
         settings.validate()?;
+        let (before, after) = (self.model.settings.solver, settings.solver);
+        if before == Solver::Direct
+            && after != Solver::Direct
+            && let Some(what) = crate::pbd::unknown(&self.model, &self.state)
+        {
+            return Err(Error::invalid("settings", "solver", what, "the direct solver, in a world with what that of the paper does not know"));
+        }
         self.model.settings = settings;
         self.state.interrupt(Onset::Unknown);
+        if before != Solver::Direct && after == Solver::Direct {
+            self.follow_strain(0..self.model.mass.len());
+        }
         Ok(())
     }
     /// Friction between two surfaces (indices given in `RodSpec::surface`, `ShapeSpec::surface`).
@@ -95,9 +111,8 @@ impl World {
             size: spec.along.size.clone(),
             material: spec.material.clone(),
             stretch: spec.stretch,
-            flat: low.flat,
+            flat: crate::model::rod::is_flat(&low.sections),
             surface: spec.surface,
-            contact_stiffness: crate::params::CONTACT_STIFFNESS * spec.material.young_modulus * low.radius,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
         for e in 0..=n {
@@ -111,6 +126,7 @@ impl World {
             state.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
             model.offset.push(0.0);
+            model.factors.push(low.factors[e.min(n - 1)]);
             model.section.push(section);
             model.stretch_stiffness.push(DVec3::splat(section.ea));
             model.joint_length.push(0.0);
@@ -130,11 +146,7 @@ impl World {
         state.tension.resize(total, 0.0);
         state.plastic.resize(total, DVec3::ZERO);
         state.hardened.resize(total, 0.0);
-        for e in first..first + n {
-            if !self.model.inextensible[e] {
-                state.tension[e] = crate::rod::element_strain(&self.model, state, e).z * self.model.stretch_stiffness[e].z;
-            }
-        }
+        self.follow_strain(first..first + n);
         self.model.refresh_masses(&self.state.loads);
         self.model.refresh_welds();
         if let Some([before, after]) = low.seam {
@@ -143,6 +155,65 @@ impl World {
             self.join(vec![member(n as u32, Some(Side::along(before)), None), member(0, None, Some(Side::along(after)))], orientation);
         }
         Ok(handle)
+    }
+
+    /// Tensions of elastic elements are those of their strains.
+    fn follow_strain(&mut self, range: core::ops::Range<usize>) {
+        let (model, state) = (&self.model, &mut self.state);
+        for e in range {
+            if model.is_element(e) && !model.inextensible[e] {
+                state.tension[e] = crate::rod::element_strain(model, state, e).z * model.stretch_stiffness[e].z;
+            }
+        }
+    }
+
+    /// Makes a thread that is in the world of another material, checked as that of a new one. [`Along`](crate::Along) goes on to hold: modulus and
+    /// density are multiplied along the thread as they were.
+    ///
+    /// Where the thread is and how fast it moves stays, and so does its shape at rest with the plastic set that it has (also where the new material takes
+    /// none) and the hardening, which is counted in strains at yield. Forces follow: tensions of an elastic thread and all moments are those of
+    /// the present strains from here on, momentum is that of the present velocities. The multipliers of an inextensible thread, contact forces and
+    /// the forces of grips are those of the last substep until the next one. What is bent beyond a new yield yields in the next substep.
+    /// The integrator starts anew, as after any other edit.
+    pub fn set_material(&mut self, rod: Handle<Rod>, material: &Material) -> Result<(), Error> {
+        material.validate()?;
+        let model = &self.model;
+        let r = model.rods.get(rod).ok_or(ROD)?;
+        let elements = model.factors[r.elements()].iter().copied().zip(model.rest_length[r.elements()].iter().copied());
+        let sections = crate::model::rod::sections(material, &r.section, r.section_radius, elements)?;
+        let (old, old_sections) = (r.material.clone(), model.section[r.elements()].to_vec());
+        let change = |model: &mut Model| model.set_material(rod.index, material.clone(), &sections);
+        self.remake(rod, change, |model| model.set_material(rod.index, old, &old_sections))
+    }
+
+    /// Lets a thread that is in the world stretch, or keeps it from stretching. One that is stretched shrinks to its rest length within the next
+    /// substep, with the jolt that this is, or goes on as it is where what holds it does not give way, and the step says so. One that begins to
+    /// stretch carries no tension at first: what it bore lengthens it.
+    /// Not where a brake pays it out, which wants one that stretches.
+    pub fn set_stretch(&mut self, rod: Handle<Rod>, stretch: Stretch) -> Result<(), Error> {
+        let old = self.model.rods.get(rod).ok_or(ROD)?.stretch;
+        let brake = |r: &ReelState| r.rod == rod.index && matches!(r.law, ReelLaw::Brake(_));
+        if stretch == Stretch::Inextensible && self.state.reels.iter().any(|(_, r)| brake(r)) {
+            return Err(Error::invalid("rod", "stretch", stretch, "Elastic, for a thread that a brake pays out"));
+        }
+        self.remake(rod, |model| model.set_stretch(rod.index, stretch), |model| model.set_stretch(rod.index, old))
+    }
+
+    /// Changes stiffness or mass of a thread; puts them back where that leaves the world out of all proportion.
+    fn remake(&mut self, rod: Handle<Rod>, change: impl FnOnce(&mut Model), back: impl FnOnce(&mut Model)) -> Result<(), Error> {
+        let elements = self.model.rods.get(rod).ok_or(ROD)?.elements();
+        let tension = self.state.tension[elements.clone()].to_vec();
+        change(&mut self.model);
+        self.model.refresh_masses(&self.state.loads);
+        self.follow_strain(elements.clone());
+        if !crate::rod::in_proportion(&self.model, &self.state) {
+            back(&mut self.model);
+            self.model.refresh_masses(&self.state.loads);
+            self.state.tension[elements].copy_from_slice(&tension);
+            return Err(Error::invalid("rod", "material", "out of all proportion", "numbers with which the energy of the world is finite"));
+        }
+        self.state.interrupt(Onset::Unknown);
+        Ok(())
     }
 
     /// Removes a thread with its grips and loads. What it was welded to comes apart where fewer than two threads are left.
@@ -157,6 +228,7 @@ impl World {
         drain!(
             model.rod_of,
             model.mass,
+            model.factors,
             model.section,
             model.inertia,
             model.rest_length,
@@ -281,6 +353,9 @@ impl World {
         }
         let mass: f64 = places.iter().map(|p| model.mass[p.2]).sum();
         let velocity = places.iter().map(|p| state.velocity[p.2] * model.mass[p.2]).sum::<DVec3>() / mass;
+        if !velocity.is_finite() {
+            return Err(Error::invalid("weld", "places", velocity, "places of finite momentum"));
+        }
         let at = held.first().map_or(middle, |i| state.position[*i]);
         for (_, _, i) in places {
             (self.state.position[i], self.state.velocity[i]) = (at, velocity);
@@ -704,12 +779,16 @@ impl World {
 
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
     pub fn snapshot(&self) -> Vec<u8> {
-        crate::snapshot::write(&self.state)
+        crate::snapshot::write(&self.state, crate::snapshot::made_of(&self.model))
     }
 
-    /// Takes the world back to a snapshot of a world with the same model. On error nothing is changed.
+    /// Takes the world back to a snapshot of a world with the same threads and shapes. On error nothing is changed.
+    ///
+    /// Materials, settings and friction are the model's: they stay as they are now. Where threads were of another material, or stretched otherwise, when the
+    /// snapshot was taken, its strains, velocities and plastic set are taken over, tensions follow the strains, and the integrator starts anew, as if
+    /// [`World::set_material`] came after it. Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let state = crate::snapshot::read(bytes)?;
+        let (made_of, state) = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
         crate::reel::check(&self.model, &self.state, &state).map_err(refused)?;
         let before = self.state.clone();
@@ -717,6 +796,10 @@ impl World {
         let fits = self.check_fit(&state);
         if fits.is_ok() {
             self.take_up(&state);
+            if made_of.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
+                self.state.interrupt(Onset::Unknown);
+                self.follow_strain(0..self.model.mass.len());
+            }
         }
         // Finite numbers may be so large that what is worked out from them, with the masses that they attach, is not.
         let sound = fits.and_then(|()| crate::rod::in_proportion(&self.model, &self.state).then_some(()).ok_or("a number in it is out of all proportion"));

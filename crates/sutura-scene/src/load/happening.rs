@@ -1,6 +1,6 @@
 //! What happens: phases, actions, motions, loads.
 
-use super::things::{n_elements, reel_law};
+use super::things::{n_elements, reel_law, remake};
 use super::*;
 
 /// Longest time of a phase that ends by a condition, unless it says otherwise \[s\].
@@ -65,7 +65,7 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
-        const VERBS: [&str; 12] = ["take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction", "reel"];
+        const VERBS: [&str; 13] = ["take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction", "material", "reel"];
         let found: Vec<(&str, Value<'d>)> = VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
         let [(verb, value)] = found.as_slice() else {
             table.finish();
@@ -84,6 +84,7 @@ impl<'d> Loader<'d> {
             "mark" => self.find_thread(value).map(|thread| Action::Mark { thread }),
             "gravity" => value.vector(Dim::ACCELERATION).map(|v| Action::Gravity { value: v, ramp: ramp(table, 0.0) }),
             "reel" => self.find_reel(value).zip(reel_law(table)).map(|(reel, law)| Action::Reel { reel, law }),
+            "material" => self.find_thread(value).map(|thread| Action::Remake { thread, change: remake(table) }),
             "friction" => self.two_surfaces(value).zip(coefficients(table)).map(|((a, b), friction)| Action::Friction { a, b, friction }),
             _ => value.table().map(|t| {
                 let has = |key: &str| t.has(key);

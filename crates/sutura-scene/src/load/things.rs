@@ -1,6 +1,7 @@
 //! Threads and shapes.
 
 use super::*;
+use crate::scene::Remake;
 
 /// Most elements of all threads together: far beyond what runs in real time, and a slip of the pen must not fill the memory or cut a
 /// centerline for minutes.
@@ -12,7 +13,7 @@ impl<'d> Loader<'d> {
         let name = table.need("name", "the name of the thread").and_then(|v| v.text()).map_or(format!("thread{index}"), std::borrow::Cow::into_owned);
         let shape = self.cross_section(table);
         let material = self.material(table);
-        let stretch = table.get("stretch").and_then(|v| v.choice(&[("elastic", Stretch::Elastic), ("inextensible", Stretch::Inextensible)]));
+        let stretch = stretch(table);
         let surface = self.surface(table, 0);
         let knot = table.truth_or("knot", false);
         let strength = strength(table);
@@ -108,22 +109,10 @@ impl<'d> Loader<'d> {
         });
         let e = along(table, "young_modulus", Dim::PRESSURE).or(preset.map(|p| (p.young_modulus.value, Profile::default())));
         let density = along(table, "density", Dim::DENSITY).or(preset.map(|p| (p.density.value, Profile::default())));
-        let nu = in_range(table, "poisson_ratio", Dim::NUMBER, -0.999_999, 0.5);
-        let g = positive(table, "shear_modulus", Dim::PRESSURE);
-        if nu.is_some() && g.is_some() {
-            table.problem("`poisson_ratio` and `shear_modulus` exclude each other", None);
-        }
-        let bend_scale = in_range(table, "bend_scale", Dim::NUMBER, 1e-12, 1.0).or(preset.map(|p| p.bend_scale.value)).unwrap_or(1.0);
-        let bend_damping = in_range(table, "bend_damping", Dim::TIME, 0.0, 1e6).or(preset.map(|p| p.bend_damping.value)).unwrap_or(0.0);
-        let plasticity = table.get("plasticity").and_then(|v| {
-            let t = v.table()?;
-            let yield_curvature = t.need("yield_curvature", "a curvature (1/m)").and_then(|v| positive_value(&v, Dim::CURVATURE));
-            let yield_twist = positive(&t, "yield_twist", Dim::CURVATURE);
-            let hardening = in_range(&t, "hardening", Dim::NUMBER, 0.0, 0.999_999).unwrap_or(0.0);
-            t.finish();
-            let yield_curvature = yield_curvature?;
-            Some(Plasticity { yield_curvature, yield_twist: yield_twist.unwrap_or(yield_curvature), hardening })
-        });
+        let shear = shear(table);
+        let bend_scale = bend_scale(table).or(preset.map(|p| p.bend_scale.value)).unwrap_or(1.0);
+        let bend_damping = bend_damping(table).or(preset.map(|p| p.bend_damping.value)).unwrap_or(0.0);
+        let plasticity = table.get("plasticity").and_then(|v| plasticity(&v));
         let (Some((young_modulus, modulus_along)), Some((density, density_along))) = (e, density) else {
             if !failed && !table.has("young_modulus") {
                 table.problem("`material` or `young_modulus` is missing", Some(format!("materials: {}", names_of_materials())));
@@ -132,11 +121,7 @@ impl<'d> Loader<'d> {
             }
             return None;
         };
-        let shear = match (g, nu) {
-            (Some(g), _) => Shear::Modulus(g),
-            (None, Some(nu)) => Shear::Poisson(nu),
-            (None, None) => Shear::Poisson(preset.map_or(0.4, |p| p.poisson_ratio.value)),
-        };
+        let shear = shear.unwrap_or(Shear::Poisson(preset.map_or(0.4, |p| p.poisson_ratio.value)));
         Some((Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity }, modulus_along, density_along))
     }
 
@@ -477,6 +462,59 @@ fn along_value(value: &Value<'_>, dim: Dim) -> Option<(f64, Profile)> {
     };
     points.iter_mut().for_each(|(_, v)| *v /= largest);
     Some((largest, Profile(points)))
+}
+
+fn shear(table: &Table<'_>) -> Option<Shear> {
+    let nu = in_range(table, "poisson_ratio", Dim::NUMBER, -0.999_999, 0.5);
+    let g = positive(table, "shear_modulus", Dim::PRESSURE);
+    if nu.is_some() && g.is_some() {
+        table.problem("`poisson_ratio` and `shear_modulus` exclude each other", None);
+    }
+    g.map(Shear::Modulus).or(nu.map(Shear::Poisson))
+}
+
+fn bend_scale(table: &Table<'_>) -> Option<f64> {
+    in_range(table, "bend_scale", Dim::NUMBER, 1e-12, 1.0)
+}
+
+fn bend_damping(table: &Table<'_>) -> Option<f64> {
+    in_range(table, "bend_damping", Dim::TIME, 0.0, 1e6)
+}
+
+fn stretch(table: &Table<'_>) -> Option<Stretch> {
+    table.get("stretch")?.choice(&[("elastic", Stretch::Elastic), ("inextensible", Stretch::Inextensible)])
+}
+
+fn plasticity(value: &Value<'_>) -> Option<Plasticity> {
+    let t = value.table()?;
+    let yield_curvature = t.need("yield_curvature", "a curvature (1/m)").and_then(|v| positive_value(&v, Dim::CURVATURE));
+    let yield_twist = positive(&t, "yield_twist", Dim::CURVATURE);
+    let hardening = in_range(&t, "hardening", Dim::NUMBER, 0.0, 0.999_999).unwrap_or(0.0);
+    t.finish();
+    let yield_curvature = yield_curvature?;
+    Some(Plasticity { yield_curvature, yield_twist: yield_twist.unwrap_or(yield_curvature), hardening })
+}
+
+/// What an action changes of what a thread is made of.
+pub(super) fn remake(table: &Table<'_>) -> Remake {
+    let plasticity = table.get("plasticity").and_then(|v| match v.is_text() {
+        true => v.choice(&[("none", None)]),
+        false => plasticity(&v).map(Some),
+    });
+    let change = Remake {
+        young_modulus: positive(table, "young_modulus", Dim::PRESSURE),
+        shear: shear(table),
+        density: positive(table, "density", Dim::DENSITY),
+        bend_scale: bend_scale(table),
+        bend_damping: bend_damping(table),
+        plasticity,
+        stretch: stretch(table),
+    };
+    const KEYS: [&str; 8] = ["young_modulus", "poisson_ratio", "shear_modulus", "density", "bend_scale", "bend_damping", "plasticity", "stretch"];
+    if !KEYS.iter().any(|k| table.has(k)) {
+        table.problem("what of the material changes?", Some(format!("any of: {}", KEYS.join(", "))));
+    }
+    change
 }
 
 /// Knot-pull strength: as given, or the limit for size and material. (A name that is no preset's is reported where the number is used.)

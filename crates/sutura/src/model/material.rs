@@ -1,7 +1,7 @@
 //! Moduli to compliance and mass. The only place where a Young's modulus becomes a stiffness.
 
 use crate::error::{Error, check};
-use crate::model::section::{Along, Section};
+use crate::model::section::{Factors, Section};
 use glam::DVec3;
 
 /// What a thread is made of.
@@ -91,12 +91,11 @@ pub struct SectionStiffness {
 }
 
 impl SectionStiffness {
-    /// At rest arc length `s` \[m\] of a rod; `radius` \[m\] is that of a round section of size 1.
-    pub fn new(material: &Material, section: &Section, radius: f64, along: &Along, s: f64) -> Self {
-        let of = section.areas(radius, along.size.at(s));
-        let stiff = along.modulus.at(s);
-        let (e, g) = (material.young_modulus * stiff, material.shear_modulus() * stiff);
-        let density = material.density * along.density.at(s);
+    /// Where the factors along a rod are `here`; `radius` \[m\] is that of a round section of size 1.
+    pub fn new(material: &Material, section: &Section, radius: f64, here: Factors) -> Self {
+        let of = section.areas(radius, here.size);
+        let (e, g) = (material.young_modulus * here.modulus, material.shear_modulus() * here.modulus);
+        let density = material.density * here.density;
         let nu = (e / (2.0 * g) - 1.0).clamp(0.0, 0.5);
         let [i1, i2] = of.about;
         SectionStiffness {
@@ -112,11 +111,12 @@ impl SectionStiffness {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::section::Along;
 
     #[test]
     fn section_of_the_2_0_monofilament() {
         // Reference set T1: d = 0.30 mm, E = 2 GPa, nu = 0.4, rho = 1150.
-        let s = SectionStiffness::new(&Material::elastic(2.0e9, 1150.0), &Section::Round, 0.15e-3, &Along::default(), 0.0);
+        let s = SectionStiffness::new(&Material::elastic(2.0e9, 1150.0), &Section::Round, 0.15e-3, Along::default().at(0.0));
         for (got, want) in [(s.ea, 141.372), (s.bend.x, 7.95216e-7), (s.bend.y, s.bend.x), (s.bend.z, 5.68011e-7), (s.mass, 8.12887e-5)] {
             assert!((got / want - 1.0).abs() < 1e-5, "{got} {want}");
         }

@@ -13,8 +13,9 @@ use crate::params::{Friction, Settings};
 use crate::state::{LoadState, State};
 use glam::{DQuat, DVec3};
 use grip::LoadKind;
-use material::SectionStiffness;
-use rod::RodModel;
+use material::{Material, SectionStiffness};
+use rod::{RodModel, Stretch};
+use section::Factors;
 use shape::{Geometry, ShapeMotion};
 use weld::WeldModel;
 
@@ -42,6 +43,8 @@ pub struct Model {
 
     /// Rest length of each element \[m\].
     pub(crate) rest_length: Vec<f64>,
+    /// Size, modulus and density of each element over those of its rod.
+    pub(crate) factors: Vec<Factors>,
     /// Stiffness and mass per length of each element.
     pub(crate) section: Vec<SectionStiffness>,
     /// Moments of inertia of each frame along its directors, attached ones included \[kg m^2\].
@@ -77,6 +80,31 @@ impl Model {
         match self.friction.binary_search_by_key(&key, |(k, _)| *k) {
             Ok(i) => self.friction[i].1,
             Err(_) => self.settings.friction,
+        }
+    }
+    /// Makes a rod of a material, which gives its elements these sections. Masses are to be refreshed.
+    pub(crate) fn set_material(&mut self, slot: u32, material: Material, sections: &[SectionStiffness]) {
+        let rod = self.rods.at_mut(slot).expect("living");
+        rod.flat = rod::is_flat(sections);
+        let damping = material.bend_damping;
+        rod.material = material;
+        let (elements, particles) = (rod.elements(), rod.particles());
+        self.section[elements].copy_from_slice(sections);
+        self.bend_damping[particles.clone()].fill(damping);
+        self.refresh_rod(particles);
+    }
+    /// Makes a rod one that stretches or does not.
+    pub(crate) fn set_stretch(&mut self, slot: u32, stretch: Stretch) {
+        let rod = self.rods.at_mut(slot).expect("living");
+        rod.stretch = stretch;
+        let particles = rod.particles();
+        self.inextensible[particles.clone()].fill(stretch == Stretch::Inextensible);
+        self.refresh_rod(particles);
+    }
+    fn refresh_rod(&mut self, particles: core::ops::Range<usize>) {
+        for e in particles {
+            self.refresh_element(e);
+            self.refresh_joint(e);
         }
     }
     /// Stiffness of an element from its section and length.

@@ -3,7 +3,7 @@
 use crate::error::{Error, check};
 use crate::math::{exp, frame_from_tangent, half, log, rotation_arc};
 use crate::model::material::{Material, SectionStiffness};
-use crate::model::section::{Along, Profile, Section};
+use crate::model::section::{Along, Factors, Profile, Section};
 use glam::{DQuat, DVec3};
 
 /// A thread. Marker of [`Handle`](crate::Handle).
@@ -165,8 +165,6 @@ pub(crate) struct RodModel {
     /// Whether it bends more easily one way than the other.
     pub flat: bool,
     pub surface: u32,
-    /// Radius-scaled normal stiffness of its surface \[N/m\].
-    pub contact_stiffness: f64,
 }
 
 impl RodModel {
@@ -176,6 +174,38 @@ impl RodModel {
     pub fn elements(&self) -> core::ops::Range<usize> {
         self.first as usize..(self.first + self.n_elements) as usize
     }
+    /// Radius-scaled normal stiffness of its surface \[N/m\].
+    pub fn contact_stiffness(&self) -> f64 {
+        crate::params::CONTACT_STIFFNESS * self.material.young_modulus * self.radius
+    }
+}
+
+/// Sections of the elements of a rod, checked. Each element is given by its factors and its rest length \[m\].
+pub(crate) fn sections(
+    material: &Material,
+    section: &Section,
+    radius: f64,
+    elements: impl Iterator<Item = (Factors, f64)>,
+) -> Result<Vec<SectionStiffness>, Error> {
+    let what = "rod";
+    let mut sections = Vec::with_capacity(elements.size_hint().0);
+    for (here, length) in elements {
+        let s = SectionStiffness::new(material, section, radius, here);
+        let stiffness = (s.ea + s.bend.max_element()) / length;
+        check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
+        let least = s.bend.min_element().min(s.kga).min(s.mass).min(s.inertia.min_element());
+        check(what, "section", least, least.is_normal(), "sizes, moduli and densities whose products are no smaller than the least number")?;
+        sections.push(s);
+    }
+    if material.plasticity.is_some() && is_flat(&sections) {
+        return Err(Error::invalid(what, "material.plasticity", section, "no plasticity for a section that is stiffer one way than the other"));
+    }
+    Ok(sections)
+}
+
+/// Whether any bends more easily one way than the other.
+pub(crate) fn is_flat(sections: &[SectionStiffness]) -> bool {
+    sections.iter().any(|s| s.bend.x != s.bend.y)
 }
 
 /// The parts of a rod that go into the world's arrays, checked.
@@ -189,9 +219,8 @@ pub(crate) struct Lowered {
     pub rest_half: Vec<DQuat>,
     pub frames: Vec<DQuat>,
     /// Of each element.
+    pub factors: Vec<Factors>,
     pub sections: Vec<SectionStiffness>,
-    /// Whether any bends more easily one way than the other.
-    pub flat: bool,
     /// With which it touches \[m\].
     pub radius: f64,
 }
@@ -327,17 +356,9 @@ impl RodSpec {
                 *q = (*q * exp(DVec3::Z * (twist * s / length))).normalize();
             }
         }
-        let sections: Vec<_> = middles.iter().map(|s| SectionStiffness::new(&self.material, &self.section, self.radius, &self.along, *s)).collect();
-        for (section, l) in sections.iter().zip(&rest_lengths) {
-            let stiffness = (section.ea + section.bend.max_element()) / l;
-            check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
-            let least = section.bend.min_element().min(section.kga).min(section.mass).min(section.inertia.min_element());
-            check(what, "section", least, least.is_normal(), "sizes, moduli and densities whose products are no smaller than the least number")?;
-        }
-        let flat = sections.iter().any(|s| s.bend.x != s.bend.y);
-        if self.material.plasticity.is_some() && flat {
-            return Err(Error::invalid(what, "material.plasticity", self.section, "no plasticity for a section that is stiffer one way than the other"));
-        }
-        Ok(Lowered { centerline: points.clone(), seam, rest_lengths, rest_half, frames, sections, flat, radius: self.radius * self.along.size.largest() })
+        let factors: Vec<Factors> = middles.iter().map(|s| self.along.at(*s)).collect();
+        let elements = factors.iter().copied().zip(rest_lengths.iter().copied());
+        let sections = sections(&self.material, &self.section, self.radius, elements)?;
+        Ok(Lowered { centerline: points.clone(), seam, rest_lengths, rest_half, frames, factors, sections, radius: self.radius * self.along.size.largest() })
     }
 }

@@ -133,7 +133,19 @@ impl Profile {
     }
 }
 
+/// The factors of [`Along`] at one place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Factors {
+    pub size: f64,
+    pub modulus: f64,
+    pub density: f64,
+}
+
 impl Along {
+    /// At rest arc length `s` \[m\].
+    pub(crate) fn at(&self, s: f64) -> Factors {
+        Factors { size: self.size.at(s), modulus: self.modulus.at(s), density: self.density.at(s) }
+    }
     pub(crate) fn validate(&self) -> Result<(), Error> {
         self.size.validate("rod", "along.size")?;
         self.modulus.validate("rod", "along.modulus")?;

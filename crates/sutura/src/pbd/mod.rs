@@ -72,14 +72,15 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
 }
 
 /// What the world has and the paper has not.
-fn unknown(model: &Model, state: &State) -> Option<&'static str> {
+pub(crate) fn unknown(model: &Model, state: &State) -> Option<&'static str> {
     if model.welds.iter().next().is_some() {
         return Some("a weld or a closed thread");
     }
     if state.reels.iter().next().is_some() {
         return Some("a reel");
     }
-    if model.rods.iter().any(|(_, r)| r.material.plasticity.is_some()) {
+    // Set may be left of a material that took some.
+    if model.rods.iter().any(|(_, r)| r.material.plasticity.is_some()) || state.plastic.iter().any(|a| *a != DVec3::ZERO) {
         return Some("plastic set");
     }
     if model.shapes.iter().any(|(_, s)| matches!(s.motion, ShapeMotion::Pushed { .. })) {

@@ -67,7 +67,7 @@ impl ThreadRow {
             along: [along.normalize(), (start[b + 1] - start[b]).normalize()],
             sum: (ra.radius + rb.radius) * (1.0 + params::KEEP),
             radii: [ra.radius, rb.radius],
-            compliance: 1.0 / ra.contact_stiffness + 1.0 / rb.contact_stiffness,
+            compliance: 1.0 / ra.contact_stiffness() + 1.0 / rb.contact_stiffness(),
             mu: [f.stick, f.slide],
             sliding: false,
             anchor: DVec3::ZERO,

@@ -42,7 +42,7 @@ pub struct State {
     pub(crate) tension: Vec<f64>,
     /// Plastic bend and twist of the joint before each element \[rad\], part of the rest strain.
     pub(crate) plastic: Vec<DVec3>,
-    /// Plastic arc already travelled by each joint, for hardening \[rad\].
+    /// Plastic arc already travelled by each joint, for hardening, over its angle at yield.
     pub(crate) hardened: Vec<f64>,
 
     /// Cross-section of each weld, `world_from_weld`.

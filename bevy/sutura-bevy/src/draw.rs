@@ -258,7 +258,7 @@ fn pose_bones(space: Res<Space>, strands: Query<(&Strand, &Drawn), Or<(Changed<S
             *place = GlobalTransform::from(Transform {
                 translation: space.rotation * (x * space.scale),
                 rotation: space.rotation * q,
-                scale: Vec3::new(bone.scale, bone.scale, 1.0),
+                scale: Vec3::new(bone.scale, bone.scale, bone.stretch),
             });
         }
     }

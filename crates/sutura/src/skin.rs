@@ -95,7 +95,7 @@ pub struct SkinSpec {
 }
 
 /// Where a bone is: the middle of an element and its material frame. As a transform of a game engine: this translation and rotation, the scale
-/// `(scale, scale, 1)`.
+/// `(scale, scale, stretch)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
     /// Middle of the element in the world \[m\].
@@ -104,11 +104,13 @@ pub struct Bone {
     pub orientation: Quat,
     /// Factor on the cross-section, along d1 and d2: 1 where the thread is straight, more where blending would make it thinner.
     pub scale: f32,
+    /// Length of the element over that in the bind pose.
+    pub stretch: f32,
 }
 
 impl Default for Bone {
     fn default() -> Self {
-        Bone { position: Vec3::ZERO, orientation: Quat::IDENTITY, scale: 1.0 }
+        Bone { position: Vec3::ZERO, orientation: Quat::IDENTITY, scale: 1.0, stretch: 1.0 }
     }
 }
 
@@ -120,6 +122,8 @@ pub struct Skin {
     weights: Vec<[f32; 4]>,
     /// Place of each bone along z in the bind pose \[m\].
     bind: Vec<f64>,
+    /// Length of each element in the bind pose \[m\].
+    lengths: Vec<f64>,
     /// Bones beyond the seam of a closed thread: which element each repeats, and how it is turned from it.
     repeats: Vec<(usize, DQuat)>,
     n_elements: usize,
@@ -248,6 +252,7 @@ impl Skin {
             joints: Vec::new(),
             weights: Vec::new(),
             bind,
+            lengths: spec.lengths.clone(),
             repeats,
             n_elements: n,
             blend: spec.blend,
@@ -357,7 +362,8 @@ impl Skin {
                 Blend::InverseDistance => 1.0,
             };
             let middle = (positions[e] + positions[e + 1]) * 0.5;
-            bones[e] = Bone { position: middle.as_vec3(), orientation: orientations[e].as_quat(), scale };
+            let stretch = ((positions[e + 1] - positions[e]).length() / self.lengths[e]) as f32;
+            bones[e] = Bone { position: middle.as_vec3(), orientation: orientations[e].as_quat(), scale, stretch };
         }
         for (k, (e, turn)) in self.repeats.iter().enumerate() {
             bones[n + k] = Bone { orientation: (orientations[*e] * *turn).as_quat(), ..bones[*e] };
@@ -391,8 +397,8 @@ impl Skin {
                     let r = Mat3::from_quat(bone.orientation);
                     m.x_axis += r.x_axis * (w * bone.scale);
                     m.y_axis += r.y_axis * (w * bone.scale);
-                    m.z_axis += r.z_axis * w;
-                    center += (bone.position + r.z_axis * row.offsets[k]) * w;
+                    m.z_axis += r.z_axis * (w * bone.stretch);
+                    center += (bone.position + r.z_axis * (row.offsets[k] * bone.stretch)) * w;
                 }
             }
             // The matrix of cofactors is the transposed inverse but for a factor.

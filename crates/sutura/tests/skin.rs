@@ -211,7 +211,7 @@ fn posing_is_linear_blending_of_each_vertex() {
             .iter()
             .zip(skin.bind())
             .map(|(b, z)| {
-                Mat4::from_scale_rotation_translation(Vec3::new(b.scale, b.scale, 1.0), b.orientation, b.position)
+                Mat4::from_scale_rotation_translation(Vec3::new(b.scale, b.scale, b.stretch), b.orientation, b.position)
                     * Mat4::from_translation(Vec3::Z * (-*z as f32))
             })
             .collect();
@@ -227,6 +227,26 @@ fn posing_is_linear_blending_of_each_vertex() {
             assert!((there - Vec3::from(posed.positions[i])).length() < 1e-3 * R as f32, "{blend:?}: vertex {i}");
             let normal = m.inverse().transpose().transform_vector3(Vec3::from(skin.mesh().normals[i])).normalize();
             assert!((normal - Vec3::from(posed.normals[i])).length() < 1e-4, "{blend:?}: normal {i}");
+        }
+    }
+}
+
+#[test]
+fn elements_that_are_stretched_each_its_own_way_are_drawn_from_particle_to_particle() {
+    let lengths = vec![3e-4; 6];
+    let mut x = vec![DVec3::ZERO];
+    for stretch in [1.4, 0.7, 1.0, 1.02, 1.5, 0.5] {
+        x.push(x[x.len() - 1] + DVec3::Z * (3e-4 * stretch));
+    }
+    for blend in [Blend::Smooth, Blend::InverseDistance] {
+        let spec = SkinSpec { blend, sides: 12, rings: 4, ..SkinSpec::new(lengths.clone(), R) };
+        let skin = Skin::new(&spec).unwrap();
+        let posed = pose(&skin, &x, &[DQuat::IDENTITY; 6]);
+        looks_outward(skin.mesh(), &posed.positions, &posed.normals, 0.5);
+        if blend == Blend::Smooth {
+            for (row, x) in rows(&skin, &posed, 4).iter().step_by(4).zip(&x) {
+                assert!((row.0 - *x).length() < 1e-3 * R, "{} instead of {x}", row.0);
+            }
         }
     }
 }

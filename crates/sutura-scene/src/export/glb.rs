@@ -50,7 +50,7 @@ impl Path {
     }
 
     fn is_scaled(&self) -> bool {
-        self.scales.iter().any(|s| (s[0] - 1.0).abs() > SEEN)
+        self.scales.iter().flatten().any(|s| (s - 1.0).abs() > SEEN)
     }
 }
 
@@ -111,7 +111,7 @@ impl Writer for Glb {
             skin.bones_at(&strand.positions, &strand.orientations, &mut bones);
             for (bone, path) in bones.iter().zip(&mut paths) {
                 path.push(bone.position.to_array(), bone.orientation.normalize().to_array());
-                path.scales.push([bone.scale, bone.scale, 1.0]);
+                path.scales.push([bone.scale, bone.scale, bone.stretch]);
             }
         }
         for (pose, path) in moment.shapes.iter().zip(&mut paths) {

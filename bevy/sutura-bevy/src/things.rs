@@ -309,7 +309,7 @@ pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bod
         }
         let go = allowed(grip.limits).go(grip.pose, grip.wrench, grip.target, dt, frames);
         let drive = match go {
-            Go::Push { direction, force, speed_limit } => Drive::Force { direction, force, speed_limit },
+            Go::Push { direction, force, speed_limit } => Drive::Hand { direction, force, speed_limit },
             Go::Stay | Go::Lead(_) => Drive::Pose,
         };
         if drive != now {

@@ -430,7 +430,7 @@ impl Stage {
         Some(match what {
             Mover::Grip(i) => match self.world.grip_drive(self.grips[i]?.handle).ok()? {
                 Drive::Pose => Way::Posed,
-                Drive::Force { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
+                Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
             },
             Mover::Shape(i) => match self.world.shape(self.shapes[i]).ok()?.motion {
                 ShapeMotion::Fixed => Way::Fixed,

@@ -80,7 +80,10 @@ impl Limits {
     /// What is done in one of `frames` frames of `dt` \[s\] in which something at `now` that acts with a force and torque would like to reach its target.
     fn go(&self, now: Pose, acting: Wrench, target: Option<Pose>, dt: f64, frames: u32) -> Go {
         let strained = acting.force.length() > OVER * self.force;
-        if self.yields && strained && let Some(direction) = acting.force.try_normalize() {
+        if self.yields
+            && strained
+            && let Some(direction) = acting.force.try_normalize()
+        {
             // Drawn harder than it may hold, it gives way along the pull.
             return Go::Push { direction, force: self.force, speed_limit: self.speed };
         }
@@ -92,7 +95,9 @@ impl Limits {
         }
         let turn = log((target.orientation * now.orientation.conjugate()).normalize());
         let mut turn = (turn * part).clamp_length_max(self.turn * dt);
-        if self.yields && let Some(axis) = turn.try_normalize() {
+        if self.yields
+            && let Some(axis) = turn.try_normalize()
+        {
             turn *= (1.0 - acting.torque.dot(axis) / self.torque).clamp(0.0, 1.0);
         }
         let next = Pose::new(if self.yields { now.position } else { now.position + way }, (exp(turn) * now.orientation).normalize());
@@ -424,7 +429,13 @@ mod tests {
             let acting = Wrench { torque: DVec3::Z * met * limits.torque, ..none };
             let now = match limits.go(Pose::IDENTITY, acting, turned, 0.01, 1) {
                 Go::Lead(pose) => log(pose.orientation).z,
-                other => if other == Go::Stay { 0.0 } else { panic!("{other:?}") },
+                other => {
+                    if other == Go::Stay {
+                        0.0
+                    } else {
+                        panic!("{other:?}")
+                    }
+                }
             };
             assert!((now - angle).abs() < 1e-12, "{now} {angle}");
         }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::input::Recording;
 use sutura_bevy::sutura::{Geometry, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch};
-use sutura_bevy::{sutura, Body, Grip, Hand, Held, PhysicsClock, PhysicsFrame, PhysicsSet, Pointer, PointerCamera, Space, Sutura, SuturaPlugin, Thread};
+use sutura_bevy::{Body, Grip, Hand, Held, PhysicsClock, PhysicsFrame, PhysicsSet, Pointer, PointerCamera, Space, Sutura, SuturaPlugin, Thread, sutura};
 
 /// An app whose pictures take as long as they are told to.
 fn app() -> App {

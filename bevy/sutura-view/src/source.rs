@@ -1,11 +1,11 @@
 //! What is shown: a scene that is played, or a recorded trajectory.
 
 use std::path::Path;
-use sutura_bevy::{Part, Simulation};
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::input::{Recorder, Recording};
 use sutura_bevy::sutura::skin::SkinSpec;
 use sutura_bevy::sutura::{Grip, Handle, Incident, Profile, Rod, World};
+use sutura_bevy::{Part, Simulation};
 use sutura_scene::{Mover, Runner, Scene, Thread, Trajectory, samples};
 
 /// A scene that is played. When its phases are over the world goes on by itself, for hands from outside.

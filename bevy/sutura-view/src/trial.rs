@@ -10,12 +10,12 @@ use bevy::input::keyboard::{Key, KeyboardInput, NativeKey};
 use bevy::input::mouse::MouseButtonInput;
 use bevy::prelude::*;
 use bevy::window::{CursorMoved, FileDragAndDrop, PrimaryWindow, WindowCloseRequested};
-use bevy_egui::{EguiContext, PrimaryEguiContext, egui};
+use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use sutura_bevy::sutura::input::Recording;
-use sutura_bevy::{Hand, Held, PhysicsClock, PointerCamera, Space, Strand, Sutura};
+use sutura_bevy::{Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
 use sutura_scene::samples;
 
 /// Time that anything may take: the machine may be slow and busy.
@@ -52,6 +52,7 @@ const STEPS: &[Step] = &[
     Step { name: "a picture is written (F12)", act: |w, n| press(w, n, KeyCode::F12), look: |_, notes, _| pictures(&notes.folder, 1) },
     Step { name: "a sequence of pictures begins (F11)", act: |w, n| press(w, n, KeyCode::F11), look: |world, _, n| sequence(world, n, 3) },
     Step { name: "a sequence of pictures is written (F11)", act: |w, n| press(w, n, KeyCode::F11), look: sequence_is_written },
+    Step { name: "the scene begins again (Backspace)", act: |w, n| press(w, n, KeyCode::Backspace), look: |w, n, k| opened(w, n, "", k) },
     Step { name: "a thread follows the mouse", act: take_thread, look: thread_follows },
     Step { name: "what is let go is let go", act: |w, n| button(w, n, MouseButton::Left, ButtonState::Released), look: |w, _, n| let_go(w, n) },
     Step { name: "what was shown is written as GLB (F9)", act: |w, n| press(w, n, KeyCode::F9), look: glb_is_read },
@@ -74,6 +75,7 @@ const STEPS: &[Step] = &[
 pub(crate) fn build(app: &mut App) {
     let folder = std::env::temp_dir().join(format!("sutura-try-{}", std::process::id()));
     app.world_mut().resource_mut::<Viewer>().folder = folder.clone();
+    app.init_resource::<Panels>().add_systems(EguiPrimaryContextPass, measure.after(crate::panel::show));
     let mut run = Run { folder, notes: None, step: 0, begun: None };
     app.add_systems(First, (move |world: &mut World| run.go_on(world)).before(bevy::ecs::message::MessageUpdateSystems));
 }
@@ -219,11 +221,30 @@ fn time_goes_on(world: &mut World, notes: &mut Notes, _: u32) -> Verdict {
     Ok(time(world) > notes.time + 0.25 || (stage.recorded && stage.time >= end && end > notes.time))
 }
 
-fn panels_are_open(world: &mut World, _: &mut Notes, _: u32) -> Verdict {
-    let context = context(world).ok_or("there are no panels")?;
-    // Folded, a panel is as high as its title.
-    let height = |name: &str| context.memory(|m| m.area_rect(egui::Id::new(name))).map_or(0.0, |r| r.height());
-    Ok(["Scene", "Parameters", "Curves", "Keys"].into_iter().all(|name| height(name) > 60.0))
+/// The panels of the last picture, in the order of [`PANELS`]: how high they are; 0 where one is not shown.
+#[derive(Resource, Default)]
+struct Panels([f32; PANELS.len()]);
+
+const PANELS: [&str; 5] = ["Scene", "Parameters", "Curves", "Keys", "This cannot be opened"];
+
+/// Measures them while they are drawn: egui knows them then only.
+fn measure(mut panels: ResMut<Panels>, mut contexts: Query<&mut EguiContext, With<PrimaryEguiContext>>) {
+    let Ok(mut context) = contexts.single_mut() else { return };
+    let context = context.get_mut();
+    panels.0 = PANELS.map(|name| {
+        // A window is known by its title, which may be none.
+        let id = egui::Id::new(Some(name));
+        context.memory(|m| if m.areas().is_visible(&egui::LayerId::new(egui::Order::Middle, id)) { m.area_rect(id).map_or(0.0, |r| r.height()) } else { 0.0 })
+    });
+}
+
+/// Folded, a panel is as high as its title.
+fn panels_are_open(world: &mut World, _: &mut Notes, pictures: u32) -> Verdict {
+    let folded = PANELS[..4].iter().zip(world.resource::<Panels>().0).find(|(_, height)| *height < 60.0);
+    match folded {
+        Some((name, height)) if pictures > 30 => Err(format!("the panel `{name}` is {height} high")),
+        _ => Ok(folded.is_none()),
+    }
 }
 
 /// Whether a picture was written that is one; wrong if it shows one color.
@@ -283,16 +304,16 @@ fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
             button(world, notes, MouseButton::Left, ButtonState::Pressed);
             Ok(false)
         }
-        // Taken; then 20 pixels aside.
+        // Taken; then 40 pixels up, where a thread that hangs has room.
         7..10 => Ok(false),
         10..30 => {
-            let Some(Held::Thread(grip)) = world.resource::<Hand>().held else { return Err("the mouse holds nothing".into()) };
+            let Some(Held::Thread(grip)) = world.resource::<Hand>().held else { return Err(nothing_held(world, notes)) };
             let now = world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position);
             let place = world.resource::<Space>().place(now.unwrap_or_default());
             if pictures == 10 {
                 notes.place = place;
             }
-            let at = notes.at + Vec2::new(2.0, 0.0) * (pictures - 9) as f32;
+            let at = notes.at - Vec2::new(0.0, 2.0) * (pictures - 9) as f32;
             point(world, notes, at);
             Ok(false)
         }
@@ -300,9 +321,20 @@ fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
             let Some(Held::Thread(grip)) = world.resource::<Hand>().held else { return Err("the mouse lost what it held".into()) };
             let now = world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position).unwrap_or_default();
             let moved = pixels(world, world.resource::<Space>().place(now)).zip(pixels(world, notes.place)).map(|(a, b)| a - b);
-            Ok(moved.is_some_and(|m| (m.x - 40.0).abs() < 6.0 && m.y.abs() < 6.0))
+            match moved {
+                Some(m) if m.x.abs() < 6.0 && (m.y + 40.0).abs() < 6.0 => Ok(true),
+                _ if pictures < 150 => Ok(false),
+                _ => Err(format!("the mouse went 40 pixels up, what it holds {moved:?}")),
+            }
         }
     }
+}
+
+fn nothing_held(world: &mut World, notes: &Notes) -> String {
+    let cursor = world.get::<Window>(notes.window).and_then(Window::cursor_position);
+    let (at, thread, pointer) = (notes.at, middle(world), world.resource::<Pointer>());
+    let state = format!("{}, {}", if pointer.busy { "over a panel" } else { "over no panel" }, if pointer.pressed { "button down" } else { "button up" });
+    format!("the mouse holds nothing: it went to {at}, is at {cursor:?} ({state}), a thread at {thread:?}")
 }
 
 /// A point in the picture.
@@ -312,10 +344,12 @@ fn pixels(world: &World, at: Vec3) -> Option<Vec2> {
     camera.world_to_viewport(place, at).ok()
 }
 
+/// The middle of the first thread that has it in the picture.
 fn middle(world: &mut World) -> Option<Vec2> {
     let space = *world.resource::<Space>();
-    let at = world.query::<&Strand>().iter(world).find_map(|s| s.positions.get(s.positions.len() / 2).copied())?;
-    pixels(world, space.place(at))
+    let size = world.query_filtered::<&Window, With<PrimaryWindow>>().single(world).ok()?.size();
+    let places: Vec<_> = world.query::<&Strand>().iter(world).filter_map(|s| s.positions.get(s.positions.len() / 2)).map(|p| space.place(*p)).collect();
+    places.into_iter().filter_map(|p| pixels(world, p)).find(|p| p.min_element() > 0.0 && p.cmplt(size).all())
 }
 
 fn let_go(world: &mut World, pictures: u32) -> Verdict {
@@ -398,8 +432,7 @@ fn error_is_shown(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
     if !kept {
         return Err("what was on view is lost".into());
     }
-    let context = context(world).ok_or("there are no panels")?;
-    let shown = context.memory(|m| m.area_rect(egui::Id::new("This cannot be opened"))).is_some_and(|r| r.height() > 30.0);
+    let shown = world.resource::<Panels>().0[4] > 30.0;
     if !shown && pictures > 5 { Err("its window is not there".into()) } else { Ok(shown) }
 }
 

@@ -1,6 +1,7 @@
 //! A game: two players tug at a thread that lies around a post, one with A and D, one with the arrow keys. Whoever draws the middle of the thread
 //! over to their side wins. Only the plugin's public interface is used.
 
+use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::prelude::*;
 use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::{Friction, Geometry, Hold, Material, Place, Pose, RodSpec, ShapeSpec};
@@ -9,8 +10,9 @@ use sutura_bevy::{Body, Grip, PhysicsFrame, PhysicsSet, Space, Sutura, SuturaPlu
 /// Half the length of the thread on each side of the post \[m\].
 const ARM: f64 = 0.06;
 const POST: f64 = 0.006;
-/// How fast a player pulls \[m/s\].
+/// How fast a player pulls \[m/s\], and how hard, pulling and at rest \[N\].
 const SPEED: f64 = 0.03;
+const FORCE: (f64, f64) = (5.0, 2.0);
 
 /// A player, by the keys that pull and give way.
 #[derive(Component)]
@@ -50,7 +52,12 @@ fn set_up(mut commands: Commands, mut sutura: ResMut<Sutura>, space: Res<Space>)
     commands.spawn((Grip::new(thread, Place::End, Hold::Pin), Player(KeyCode::ArrowDown, KeyCode::ArrowUp)));
 
     let eye = space.place(DVec3::new(0.0, -0.2, 0.02));
-    commands.spawn((Camera3d::default(), Transform::from_translation(eye).looking_at(space.place(DVec3::new(0.0, 0.0, -0.025)), Vec3::Y)));
+    // The tone mapping that Bevy takes by itself wants a table that this build of it has not.
+    commands.spawn((
+        Camera3d::default(),
+        Tonemapping::AcesFitted,
+        Transform::from_translation(eye).looking_at(space.place(DVec3::new(0.0, 0.0, -0.025)), Vec3::Y),
+    ));
     commands.spawn((DirectionalLight { illuminance: 8000.0, ..default() }, Transform::from_xyz(4.0, 10.0, 8.0).looking_at(Vec3::ZERO, Vec3::Y)));
     Ok(())
 }
@@ -60,6 +67,7 @@ fn pull(keys: Res<ButtonInput<KeyCode>>, mut grips: Query<(&mut Grip, &Player)>,
     for (mut grip, Player(harder, weaker)) in &mut grips {
         let way = f64::from(keys.pressed(*weaker)) - f64::from(keys.pressed(*harder));
         let pose = grip.pose();
+        grip.limits.force = if way < 0.0 { FORCE.0 } else { FORCE.1 };
         if grip.handle().is_some() {
             grip.target = Some(Pose::new(pose.position + DVec3::Z * way * SPEED * clock.frame, pose.orientation));
         }

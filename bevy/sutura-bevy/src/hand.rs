@@ -7,7 +7,7 @@ use crate::world::Sutura;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use sutura::glam::DVec3;
-use sutura::{Geometry, Hold, Place, Pose};
+use sutura::{Geometry, Handle, Hold, Place, Pose, Rod};
 
 /// Marks the camera through which the pointer looks.
 #[derive(Component, Debug, Clone, Copy, Default)]
@@ -118,7 +118,7 @@ pub(crate) fn grab(
             Some(Held::Thread(grip)) => commands.entity(grip).try_despawn(),
             Some(Held::Body(body)) => {
                 if let Ok((_, mut body)) = bodies.get_mut(body) {
-                    // It stays where it was put.
+                    // It stays where it was put, unless it is moved by something else.
                     body.target = None;
                 }
             }
@@ -137,7 +137,12 @@ pub(crate) fn grab(
         let t = match (thread, body) {
             // A thread behind a body is hidden.
             (Some(thread), body) if body.is_none_or(|b| thread.t <= b.1 + thread.radius) => {
-                let grip = Grip::new(thread.entity, thread.place, hand.hold).limited(hand.speed_limit, hand.force_limit);
+                let theirs = thread.handle.and_then(|rod| Some((sutura.grip_at(rod, thread.particle)?, sutura.world())));
+                let grip = match theirs.and_then(|(grip, world)| Some((grip, world.grip_pose(grip).ok()?))) {
+                    Some((grip, pose)) => Grip::of(thread.entity, grip, pose),
+                    None => Grip::new(thread.entity, Place::Particle(thread.particle as u32), hand.hold),
+                };
+                let grip = grip.limited(hand.speed_limit, hand.force_limit);
                 hand.held = Some(Held::Thread(commands.spawn(grip).id()));
                 hand.offset = thread.at - (origin + direction * thread.t);
                 thread.t
@@ -159,6 +164,7 @@ pub(crate) fn grab(
             // In the frame in which it is taken, the grip is not there yet and stays where it took.
             if let Ok(mut grip) = grips.get_mut(grip) {
                 let orientation = grip.pose().orientation;
+                (grip.limits.speed, grip.limits.force) = (hand.speed_limit, hand.force_limit);
                 grip.target = Some(Pose::new(at, orientation));
                 hand.force = grip.wrench().force;
             }
@@ -167,6 +173,9 @@ pub(crate) fn grab(
             if let Ok((_, mut body)) = bodies.get_mut(body) {
                 if let Some(pose) = body.handle().and_then(|h| sutura.world().shape(h).ok()).map(|s| s.pose) {
                     body.target = Some(Pose::new(at, pose.orientation));
+                    (body.limits.speed, body.limits.force) = (hand.speed_limit, hand.force_limit);
+                    // It may not have come along.
+                    hand.at = pose.position;
                 }
                 // What the hand has to hold against.
                 hand.force = -body.wrench().force;
@@ -180,7 +189,8 @@ pub(crate) fn grab(
 #[derive(Clone, Copy)]
 struct Found {
     entity: Entity,
-    place: Place,
+    handle: Option<Handle<Rod>>,
+    particle: usize,
     /// Along the ray \[m\].
     t: f64,
     at: DVec3,
@@ -205,7 +215,7 @@ fn nearest_thread<'a>(sutura: &Sutura, threads: impl Iterator<Item = (Entity, &'
             let beside = (distance - rod.radius() - 0.5 * length).max(0.0) / t;
             let nearer = |b: &Found| (beside, distance) < (b.beside, (b.at - origin - direction * b.t).length());
             if beside <= reach && best.as_ref().is_none_or(nearer) {
-                best = Some(Found { entity, place: Place::Particle(particle as u32), t, at: *at, radius: rod.radius(), beside });
+                best = Some(Found { entity, handle: thread.handle(), particle, t, at: *at, radius: rod.radius(), beside });
             }
         }
     }

@@ -46,8 +46,8 @@ pub use hand::{Hand, Held, Pointer, PointerCamera};
 pub use mesh::Triangles;
 pub use space::Space;
 pub use sutura;
-pub use things::{Body, Grip, Thread};
-pub use world::{Simulation, Sutura};
+pub use things::{Body, Grip, Limits, Thread};
+pub use world::{Part, Simulation, Sutura};
 
 use bevy::app::RunFixedMainLoop;
 use bevy::input::InputSystems;

@@ -1,10 +1,11 @@
 //! Components that put things into the world: threads, bodies, grips.
 
 use crate::clock::PhysicsClock;
-use crate::world::Sutura;
+use crate::world::{Part, Sutura};
 use bevy::prelude::*;
-use sutura::glam::DQuat;
-use sutura::{Drive, GripSpec, Handle, Hold, Place, Pose, Rod, RodSpec, Shape, ShapeMotion, ShapeSpec, Wrench};
+use sutura::glam::{DQuat, DVec3};
+use sutura::math::{exp, log};
+use sutura::{Drive, GripSpec, Handle, Hold, Place, Pose, Rod, RodSpec, Shape, ShapeMotion, ShapeSpec, Solver, Wrench};
 
 /// A thread. It is in the world from the next frame on, and as long as its entity lives.
 #[derive(Component, Debug)]
@@ -41,6 +42,72 @@ impl Thread {
     }
 }
 
+/// How a grip or body gets to its target.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Fastest that it moves \[m/s\].
+    pub speed: f64,
+    /// Fastest that it turns \[rad/s\].
+    pub turn: f64,
+    /// Whether it gives way, as a hand does: it moves with no more than `force`, slower by the part of that which it meets, and then turns with no more
+    /// than `torque`. One that does not is a machine: it moves and turns whatever the force, and a thread that cannot follow gets stuck. (In a world
+    /// of the paper's solver, which knows no such drive, everything is a machine.)
+    pub yields: bool,
+    /// Greatest force of one that yields \[N\].
+    pub force: f64,
+    /// Greatest torque of one that yields \[N m\].
+    pub torque: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { speed: 1.0, turn: 10.0, yields: true, force: 5.0, torque: 0.05 }
+    }
+}
+
+/// What is done with a thing in a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Go {
+    /// It holds where it is.
+    Stay,
+    /// A force takes it along a line.
+    Push { direction: DVec3, force: f64, speed_limit: f64 },
+    /// It is led to this pose.
+    Lead(Pose),
+}
+
+impl Limits {
+    /// What is done in one of `frames` frames of `dt` \[s\] in which something at `now` that acts with a force and torque would like to reach its target.
+    fn go(&self, now: Pose, acting: Wrench, target: Option<Pose>, dt: f64, frames: u32) -> Go {
+        let strained = acting.force.length() > OVER * self.force;
+        if self.yields
+            && strained
+            && let Some(direction) = acting.force.try_normalize()
+        {
+            // Drawn harder than it may hold, it gives way along the pull.
+            return Go::Push { direction, force: self.force, speed_limit: self.speed };
+        }
+        let Some(target) = target else { return Go::Stay };
+        let part = 1.0 / f64::from(frames.max(1));
+        let way = ((target.position - now.position) * part).clamp_length_max(self.speed * dt);
+        if self.yields && way.length() > CLOSE {
+            return Go::Push { direction: way.normalize(), force: self.force, speed_limit: way.length() / dt };
+        }
+        let turn = log((target.orientation * now.orientation.conjugate()).normalize());
+        let mut turn = (turn * part).clamp_length_max(self.turn * dt);
+        if self.yields
+            && let Some(axis) = turn.try_normalize()
+        {
+            turn *= (1.0 - acting.torque.dot(axis) / self.torque).clamp(0.0, 1.0);
+        }
+        let next = Pose::new(if self.yields { now.position } else { now.position + way }, (exp(turn) * now.orientation).normalize());
+        if next == now { Go::Stay } else { Go::Lead(next) }
+    }
+}
+
+/// How far above its limit a force is before what acts with it gives way, so that the limit itself can be held.
+const OVER: f64 = 1.02;
+
 /// A body that threads touch: a shape of the engine.
 #[derive(Component, Debug)]
 #[require(Transform, Visibility)]
@@ -49,14 +116,16 @@ pub struct Body {
     handle: Option<Handle<Shape>>,
     own: bool,
     error: Option<sutura::Error>,
-    /// Where it is to be \[m\]; it goes there no faster than `speed_limit`. `None` leaves it to what moves it otherwise.
+    /// Where it is to be \[m\]; it goes there within `limits`. `None` leaves it to what moves it otherwise.
     pub target: Option<Pose>,
-    /// \[m/s\].
-    pub speed_limit: f64,
+    /// How it goes there.
+    pub limits: Limits,
     /// How it looks.
     pub look: crate::look::BodyLook,
-    /// What moved it before a target did.
+    /// What moved it before a target did: `None` while no target does, or where the simulation remembers it.
     before: Option<ShapeMotion>,
+    /// Whether a target moves it.
+    taken: bool,
     wrench: Wrench,
 }
 
@@ -69,9 +138,10 @@ impl Body {
             own: true,
             error: None,
             target: None,
-            speed_limit: 0.5,
+            limits: Limits { speed: 0.5, ..Limits::default() },
             look: crate::look::BodyLook::default(),
             before: None,
+            taken: false,
             wrench: Wrench::default(),
         }
     }
@@ -83,9 +153,10 @@ impl Body {
             own: false,
             error: None,
             target: None,
-            speed_limit: 0.5,
+            limits: Limits { speed: 0.5, ..Limits::default() },
             look: crate::look::BodyLook::default(),
             before: None,
+            taken: false,
             wrench: Wrench::default(),
         }
     }
@@ -117,20 +188,15 @@ pub struct Grip {
     /// Where it is to be \[m\]: it is there at the end of the frames of physics of the same drawn frame, unless a limit is reached. `None` lets it
     /// hold where it is.
     pub target: Option<Pose>,
-    /// Fastest that it moves \[m/s\].
-    pub speed_limit: f64,
-    /// Whether it gives way, as a hand does: it goes to its target with no more than `force_limit`, slower by the part of that which it meets, and does
-    /// not turn. One that does not is a machine: it moves and turns whatever the force, and a thread that cannot follow gets stuck.
-    pub yields: bool,
-    /// Greatest force of one that yields \[N\].
-    pub force_limit: f64,
+    /// How it goes there.
+    pub limits: Limits,
     handle: Option<Handle<sutura::Grip>>,
     own: bool,
     error: Option<sutura::Error>,
     /// The pose now; of one that does not yield the one given last.
     pose: Pose,
-    /// Whether a force drives it.
-    pushing: bool,
+    /// Whether it moves: the simulation leaves it to this grip then.
+    taken: bool,
     wrench: Wrench,
 }
 
@@ -142,14 +208,12 @@ impl Grip {
             place,
             hold,
             target: None,
-            speed_limit: 1.0,
-            yields: true,
-            force_limit: 5.0,
+            limits: Limits::default(),
             handle: None,
             own: true,
             error: None,
             pose: Pose::IDENTITY,
-            pushing: false,
+            taken: false,
             wrench: Wrench::default(),
         }
     }
@@ -159,7 +223,7 @@ impl Grip {
     }
     /// The same with other limits: speed \[m/s\] and force \[N\].
     pub fn limited(self, speed_limit: f64, force_limit: f64) -> Self {
-        Grip { speed_limit, force_limit, ..self }
+        Grip { limits: Limits { speed: speed_limit, force: force_limit, ..self.limits }, ..self }
     }
     /// Its handle in [`Sutura::world`], once it holds.
     pub fn handle(&self) -> Option<Handle<sutura::Grip>> {
@@ -184,23 +248,6 @@ impl Grip {
     /// Force \[N\] with which it acts on the thread.
     pub fn force(&self) -> f64 {
         self.wrench.force.length()
-    }
-
-    /// Where it goes in one of `frames` frames of `dt` \[s\] in which it would like to reach its target.
-    fn next(&self, dt: f64, frames: u32) -> Pose {
-        let Some(target) = self.target else { return self.pose };
-        let part = 1.0 / f64::from(frames.max(1));
-        let step = ((target.position - self.pose.position) * part).clamp_length_max(self.speed_limit * dt);
-        Pose::new(self.pose.position + step, toward(self.pose.orientation, target.orientation, part))
-    }
-
-    /// How one that yields gets there: by a force along the way, at a speed that brings it there where nothing resists.
-    fn drive(&self, dt: f64, frames: u32) -> Drive {
-        let way = self.next(dt, frames).position - self.pose.position;
-        match way.try_normalize().filter(|_| way.length() > CLOSE) {
-            Some(direction) => Drive::Force { direction, force: self.force_limit, speed_limit: way.length() / dt },
-            None => Drive::Pose,
-        }
     }
 }
 
@@ -250,63 +297,78 @@ pub(crate) fn take_up(mut sutura: ResMut<Sutura>, mut threads: Query<&mut Thread
 
 /// One frame of physics: what is held goes toward its target, the world is stepped, and forces are read.
 pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bodies: Query<&mut Body>, mut grips: Query<&mut Grip>) {
-    let dt = clock.frame;
-    let mut held: Vec<(Handle<sutura::Grip>, Pose, Pose)> = Vec::new();
+    let (dt, frames) = (clock.frame, clock.remaining);
+    let machines = matches!(sutura.world().settings().solver, Solver::Paper(_));
+    let allowed = |limits: Limits| Limits { yields: limits.yields && !machines, ..limits };
+    // Both lists: where each is now, and where it is led. A handle may have gone stale by what the simulation did; then there is nothing to move.
+    let mut led: Vec<(Part, Pose, Pose)> = Vec::new();
     for mut grip in &mut grips {
         let Some(handle) = grip.handle else { continue };
-        let drive = if grip.yields && grip.target.is_some() { grip.drive(dt, clock.remaining) } else { Drive::Pose };
-        // What is driven by a scene is left to it while nothing else is wanted.
-        if (grip.pushing || drive != Drive::Pose) && sutura.edit().set_grip_drive(handle, drive).is_err() {
-            continue;
+        let Ok(now) = sutura.world().grip_drive(handle) else { continue };
+        if !grip.taken {
+            // One of the simulation's is in this hand from the beginning on.
+            grip.taken = true;
+            if !grip.own {
+                sutura.hold(Part::Grip(handle), true);
+            }
         }
-        grip.pushing = drive != Drive::Pose;
-        if !grip.yields && grip.target.is_some() {
-            let next = grip.next(dt, clock.remaining);
-            held.push((handle, grip.pose, next));
+        let go = allowed(grip.limits).go(grip.pose, grip.wrench, grip.target, dt, frames);
+        let drive = match go {
+            Go::Push { direction, force, speed_limit } => Drive::Hand { direction, force, speed_limit },
+            Go::Stay | Go::Lead(_) => Drive::Pose,
+        };
+        if drive != now {
+            let _ = sutura.edit().set_grip_drive(handle, drive);
+        }
+        if let Go::Lead(next) = go {
+            led.push((Part::Grip(handle), grip.pose, next));
             grip.pose = next;
         }
     }
-    let mut moved: Vec<(Handle<Shape>, Pose, Pose)> = Vec::new();
     for mut body in &mut bodies {
         let Some(handle) = body.handle else { continue };
-        let Ok((now, motion)) = sutura.world().shape(handle).map(|s| (s.pose, s.motion)) else { continue };
-        match (body.target, body.before) {
-            (Some(target), before) => {
-                if before.is_none() {
-                    body.before = Some(motion);
-                }
-                if motion != ShapeMotion::Driven && sutura.edit().set_shape_motion(handle, ShapeMotion::Driven).is_err() {
-                    continue;
-                }
-                let part = 1.0 / f64::from(clock.remaining.max(1));
-                let way = ((target.position - now.position) * part).clamp_length_max(body.speed_limit * dt);
-                moved.push((handle, now, Pose::new(now.position + way, toward(now.orientation, target.orientation, part))));
+        let Ok((pose, now)) = sutura.world().shape(handle).map(|s| (s.pose, s.motion)) else { continue };
+        if body.taken != body.target.is_some() {
+            body.taken = body.target.is_some();
+            let seen_to = sutura.hold(Part::Body(handle), body.taken);
+            if body.taken {
+                body.before = (!seen_to).then_some(now);
+            } else if let Some(before) = body.before.take() {
+                let _ = sutura.edit().set_shape_motion(handle, before);
             }
-            (None, Some(before)) => {
-                body.before = None;
-                if before != motion && sutura.edit().set_shape_motion(handle, before).is_err() {
-                    continue;
-                }
-            }
-            (None, None) => {}
+        }
+        if !body.taken {
+            continue;
+        }
+        // What threads do to it is what the hand has to hold against.
+        let acting = Wrench { force: -body.wrench.force, torque: -body.wrench.torque };
+        let go = allowed(body.limits).go(pose, acting, body.target, dt, frames);
+        let motion = match go {
+            Go::Push { direction, force, speed_limit } => ShapeMotion::Pushed { direction, force, speed_limit },
+            Go::Stay | Go::Lead(_) => ShapeMotion::Driven,
+        };
+        if sutura.world().shape(handle).is_ok_and(|s| s.motion != motion) {
+            let _ = sutura.edit().set_shape_motion(handle, motion);
+        }
+        if let Go::Lead(next) = go {
+            led.push((Part::Body(handle), pose, next));
         }
     }
     sutura.step(dt, &mut |world, part| {
-        // A handle may have gone stale by what the simulation did in between; then there is nothing to move.
-        for (handle, from, to) in &held {
-            let _ = world.set_grip_pose(*handle, between(*from, *to, part));
-        }
-        for (handle, from, to) in &moved {
-            let _ = world.set_shape_pose(*handle, between(*from, *to, part));
+        for (what, from, to) in &led {
+            let pose = between(*from, *to, part);
+            let _ = match what {
+                Part::Grip(grip) => world.set_grip_pose(*grip, pose),
+                Part::Body(body) => world.set_shape_pose(*body, pose),
+            };
         }
     });
     for mut grip in &mut grips {
         let Some(handle) = grip.handle else { continue };
-        if let Ok(wrench) = sutura.world().grip_wrench(handle) {
-            grip.wrench = wrench;
-        }
-        if let Some(pose) = sutura.world().grip_pose(handle).ok().filter(|_| grip.yields) {
-            grip.pose = pose;
+        if let Ok((pose, wrench)) = sutura.world().grip_pose(handle).and_then(|p| Ok((p, sutura.world().grip_wrench(handle)?))) {
+            // A pin has no orientation of its own, and keeps the one that it was given.
+            let turned = if grip.hold == Hold::Pin { grip.pose.orientation } else { pose.orientation };
+            (grip.pose, grip.wrench) = (Pose::new(pose.position, turned), wrench);
         }
     }
     for mut body in &mut bodies {
@@ -335,26 +397,47 @@ pub(crate) fn body_gone(gone: On<Remove, Body>, bodies: Query<&Body>, mut sutura
 }
 
 pub(crate) fn grip_gone(gone: On<Remove, Grip>, grips: Query<&Grip>, mut sutura: ResMut<Sutura>) {
-    if let Some(handle) = grips.get(gone.entity).ok().filter(|g| g.own).and_then(Grip::handle) {
-        let _ = sutura.edit().remove_grip(handle);
+    let Ok(grip) = grips.get(gone.entity) else { return };
+    match grip.handle {
+        Some(handle) if grip.own => drop(sutura.edit().remove_grip(handle)),
+        Some(handle) if grip.taken => drop(sutura.hold(Part::Grip(handle), false)),
+        _ => {}
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sutura::glam::DVec3;
 
     #[test]
-    fn a_grip_keeps_its_speed_and_rests_where_it_is_to_be() {
-        let mut grip = Grip::new(Entity::PLACEHOLDER, Place::Start, Hold::Pin);
-        grip.target = Some(Pose::at(DVec3::X));
-        assert!((grip.next(0.01, 1).position - DVec3::X * 0.01).length() < 1e-15);
-        assert!((grip.next(10.0, 4).position - DVec3::X * 0.25).length() < 1e-15);
-        let Drive::Force { direction, force, speed_limit } = grip.drive(10.0, 4) else { panic!("not driven by force") };
-        assert_eq!((direction, force), (DVec3::X, grip.force_limit));
-        assert!((speed_limit - 0.025).abs() < 1e-15);
-        grip.target = Some(Pose::IDENTITY);
-        assert_eq!(grip.drive(0.01, 1), Drive::Pose);
+    fn what_moves_keeps_its_limits_and_rests_where_it_is_to_be() {
+        let (limits, none) = (Limits::default(), Wrench::default());
+        let machine = Limits { yields: false, ..limits };
+        let to = |p: DVec3| Some(Pose::at(p));
+        assert_eq!(limits.go(Pose::IDENTITY, none, None, 0.01, 1), Go::Stay);
+        assert_eq!(machine.go(Pose::IDENTITY, none, to(DVec3::X), 0.01, 1), Go::Lead(Pose::at(DVec3::X * 0.01)));
+        assert_eq!(machine.go(Pose::IDENTITY, none, to(DVec3::X), 10.0, 4), Go::Lead(Pose::at(DVec3::X * 0.25)));
+        assert_eq!(limits.go(Pose::IDENTITY, none, to(DVec3::X), 10.0, 4), Go::Push { direction: DVec3::X, force: limits.force, speed_limit: 0.025 });
+        assert_eq!(limits.go(Pose::IDENTITY, none, to(DVec3::ZERO), 0.01, 1), Go::Stay);
+        // Drawn harder than it may hold: along the pull, whatever it is to do.
+        let strained = Wrench { force: DVec3::Y * 6.0, ..none };
+        let gives = Go::Push { direction: DVec3::Y, force: limits.force, speed_limit: limits.speed };
+        assert_eq!((limits.go(Pose::IDENTITY, strained, None, 0.01, 1), limits.go(Pose::IDENTITY, strained, to(DVec3::X), 0.01, 1)), (gives, gives));
+        // It turns slower by the part of its torque that it meets, and not at all against all of it.
+        let turned = Some(Pose::new(DVec3::ZERO, DQuat::from_rotation_z(1.0)));
+        for (met, angle) in [(0.0, 0.1), (0.25, 0.075), (1.0, 0.0), (2.0, 0.0), (-1.0, 0.1)] {
+            let acting = Wrench { torque: DVec3::Z * met * limits.torque, ..none };
+            let now = match limits.go(Pose::IDENTITY, acting, turned, 0.01, 1) {
+                Go::Lead(pose) => log(pose.orientation).z,
+                other => {
+                    if other == Go::Stay {
+                        0.0
+                    } else {
+                        panic!("{other:?}")
+                    }
+                }
+            };
+            assert!((now - angle).abs() < 1e-12, "{now} {angle}");
+        }
     }
 }

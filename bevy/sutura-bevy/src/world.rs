@@ -3,7 +3,16 @@
 use bevy::prelude::*;
 use std::any::Any;
 use sutura::input::{Recorder, Recording};
-use sutura::{Incident, Settings, World};
+use sutura::{Handle, Incident, Rod, Settings, Shape, World};
+
+/// A thing of the world that a hand takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Part {
+    /// A grip.
+    Grip(Handle<sutura::Grip>),
+    /// A body.
+    Body(Handle<Shape>),
+}
 
 /// What is stepped: a world, or something that holds one and does more in a frame of it (a scene with motions of its own).
 pub trait Simulation: Any + Send + Sync {
@@ -16,6 +25,15 @@ pub trait Simulation: Any + Send + Sync {
     /// One frame of physics of `dt` \[s\]. It may be done in pieces; before each `drive` is to be called with the part of the frame that will be
     /// done with that piece, in (0, 1]. What went wrong comes back.
     fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident>;
+    /// A hand takes a thing that was in the world before (`held`), or lets go of it. Whether the simulation sees to what moves it from then on; else a
+    /// body that is let go is moved by what moved it before.
+    fn hold(&mut self, _part: Part, _held: bool) -> bool {
+        false
+    }
+    /// The simulation's own grip on a particle of a thread: a hand that takes hold there takes that one.
+    fn grip_at(&self, _thread: Handle<Rod>, _particle: usize) -> Option<Handle<sutura::Grip>> {
+        None
+    }
 }
 
 impl Simulation for Recorder {
@@ -78,6 +96,12 @@ impl Sutura {
     /// Everything done so far, if the world records.
     pub fn recording(&self) -> Option<&Recording> {
         self.simulation.recording()
+    }
+    pub(crate) fn hold(&mut self, part: Part, held: bool) -> bool {
+        self.simulation.hold(part, held)
+    }
+    pub(crate) fn grip_at(&self, thread: Handle<Rod>, particle: usize) -> Option<Handle<sutura::Grip>> {
+        self.simulation.grip_at(thread, particle)
     }
     pub(crate) fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) {
         self.incidents = self.simulation.step(dt, drive);

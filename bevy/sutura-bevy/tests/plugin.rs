@@ -4,10 +4,10 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use std::ops::ControlFlow;
 use std::time::Duration;
-use sutura_bevy::sutura::glam::DVec3;
+use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::input::Recording;
-use sutura_bevy::sutura::{Geometry, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec};
-use sutura_bevy::{Body, Grip, Hand, Held, PhysicsClock, Pointer, Space, Sutura, SuturaPlugin, Thread};
+use sutura_bevy::sutura::{Geometry, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch};
+use sutura_bevy::{Body, Grip, Hand, Held, PhysicsClock, PhysicsFrame, PhysicsSet, Pointer, PointerCamera, Space, Sutura, SuturaPlugin, Thread, sutura};
 
 /// An app whose pictures take as long as they are told to.
 fn app() -> App {
@@ -94,6 +94,145 @@ fn the_hand_takes_a_thread_pulls_and_lets_go() {
     assert!(tension.abs() < 0.01 * limit, "{tension}");
 }
 
+/// What a hand that leads a taut thread feels at most \[N\], and incidents.
+fn lead(app: &mut App, grip: Entity, frames: u32, way: impl Fn(&Grip) -> (DVec3, f64)) -> (f64, usize) {
+    let (mut most, mut incidents) = (0.0f64, 0);
+    for _ in 0..frames {
+        let mut g = app.world_mut().get_mut::<Grip>(grip).unwrap();
+        let ((step, turn), pose) = (way(&g), g.pose());
+        let about = DQuat::from_axis_angle(pose.orientation * DVec3::Z, turn);
+        g.target = (step != DVec3::ZERO || turn != 0.0).then(|| Pose::new(pose.position + step, (about * pose.orientation).normalize()));
+        picture(app, 1.0 / 60.0);
+        most = most.max(app.world().get::<Grip>(grip).unwrap().force());
+        incidents += app.world().resource::<Sutura>().incidents.len();
+    }
+    (most, incidents)
+}
+
+#[test]
+fn a_thread_that_does_not_stretch_is_pulled_no_harder_than_the_limit() {
+    let mut app = app();
+    let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 40, 0.2e-3, Material { bend_damping: 0.01, ..Material::elastic(1e9, 1150.0) });
+    let thread = app.world_mut().spawn(Thread::new(RodSpec { stretch: Stretch::Inextensible, ..spec })).id();
+    app.world_mut().spawn(Grip::new(thread, Place::Start, Hold::Pin));
+    let limit = 2.0;
+    let grip = app.world_mut().spawn(Grip::new(thread, Place::End, Hold::Clamp).limited(0.5, limit)).id();
+    picture(&mut app, 0.05);
+    // Slack, taut, beyond; at rest; turned while it is pulled; let go.
+    let (_, incidents) = lead(&mut app, grip, 30, |_| (DVec3::X * -0.02 / 60.0, 0.0));
+    assert_eq!(incidents, 0);
+    let (most, incidents) = lead(&mut app, grip, 90, |_| (DVec3::X * 0.02 / 60.0, 0.0));
+    assert!(incidents == 0 && most > 0.98 * limit && most < 1.01 * limit, "{most} N, {incidents}");
+    let (most, incidents) = lead(&mut app, grip, 30, |_| (DVec3::ZERO, 0.0));
+    assert!(incidents == 0 && most < 1.01 * limit, "{most} N, {incidents}");
+    let (most, incidents) = lead(&mut app, grip, 60, |_| (DVec3::X * 0.02 / 60.0, 0.05));
+    assert!(incidents == 0 && most < 1.01 * limit, "{most} N, {incidents}");
+    let turned = app.world().get::<Grip>(grip).unwrap();
+    assert!((turned.pose().position.length() - 0.1).abs() < 1e-6);
+    // Along the sphere of its length, where a force along the way alone would not do.
+    let (most, incidents) = lead(&mut app, grip, 120, |_| (DVec3::Z * 0.02 / 60.0, 0.0));
+    let at = app.world().get::<Grip>(grip).unwrap().pose().position;
+    println!("across: {most} N, {incidents} incidents, at {at}");
+    assert!(incidents == 0 && most < 1.01 * limit, "{most} N, {incidents}");
+    assert!(at.z > 0.035 && at.length() < 0.1 + 1e-6, "{at}");
+}
+
+#[test]
+fn a_post_drawn_against_a_taut_thread_stops_at_the_limit() {
+    let mut app = app();
+    // A thread between two pins, a little slack, and a post across it above.
+    let thread = thread(&mut app);
+    let end = app.world_mut().spawn(Grip::new(thread, Place::End, Hold::Pin)).id();
+    picture(&mut app, 0.05);
+    lead(&mut app, end, 30, |_| (DVec3::X * -0.002 / 60.0, 0.0));
+    let across = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let post = Geometry::Cylinder { radius: 0.003, half_length: 0.01 };
+    let post = app.world_mut().spawn(Body::new(ShapeSpec::fixed(post, Pose::new(DVec3::new(0.05, 0.0, 0.006), across)))).id();
+    // The pins are a vise, the hand is not.
+    app.world_mut().query::<&mut Grip>().iter_mut(app.world_mut()).for_each(|mut grip| grip.limits.yields = false);
+    picture(&mut app, 1.0 / 60.0);
+    let limit = 2.0;
+    app.world_mut().resource_mut::<Hand>().force_limit = limit;
+    let at = |app: &App| {
+        let handle = app.world().get::<Body>(post).unwrap().handle().unwrap();
+        app.world().resource::<Sutura>().world().shape(handle).unwrap().pose.position
+    };
+    let start = at(&app);
+    look_at(&mut app, start, true);
+    picture(&mut app, 1.0 / 60.0);
+    assert_eq!(app.world().resource::<Hand>().held, Some(Held::Body(post)));
+    // 3 cm down, where the thread lets it no farther than a few millimeters.
+    let (mut most, mut incidents) = (0.0f64, 0);
+    for k in 1..=240 {
+        look_at(&mut app, start - DVec3::Z * 0.03 * (f64::from(k) / 180.0).min(1.0), true);
+        picture(&mut app, 1.0 / 60.0);
+        most = most.max(app.world().resource::<Hand>().force.length());
+        incidents += app.world().resource::<Sutura>().incidents.len();
+    }
+    let (force, depth) = (app.world().resource::<Hand>().force, start.z - at(&app).z);
+    println!("{force} N, most {most} N, {depth} m down, {incidents} incidents");
+    assert_eq!(incidents, 0);
+    // It stops where the thread pushes back with the limit: within 1 %, and at no time beyond by more than 2 %.
+    assert!((force.length() / limit - 1.0).abs() < 0.01 && force.z < 0.0, "{force}");
+    assert!(most < 1.02 * limit, "{most}");
+    assert!(depth > 0.008 && depth < 0.02, "{depth}");
+    // Let go of, it stays.
+    let rests = at(&app);
+    look_at(&mut app, start, false);
+    picture(&mut app, 0.1);
+    assert_eq!(at(&app), rests);
+}
+
+#[test]
+fn a_mouse_event_moves_the_grip_in_the_physics_of_the_same_picture() {
+    use bevy::input::{ButtonState, InputPlugin, mouse::MouseButtonInput};
+    use bevy::window::{PrimaryWindow, WindowResolution};
+    let mut app = app();
+    app.add_plugins(InputPlugin);
+    let thread = thread(&mut app);
+    let (width, height) = (600, 400);
+    let window = app.world_mut().spawn((Window { resolution: WindowResolution::new(width, height), ..default() }, PrimaryWindow)).id();
+    // A camera that looks along -y of the engine, as Bevy would set it up for this window.
+    let space = *app.world().resource::<Space>();
+    let place = Transform::from_translation(space.place(DVec3::new(0.1, -0.3, 0.0))).looking_at(space.place(DVec3::X * 0.1), Vec3::Y);
+    let mut camera = Camera::default();
+    let lens = PerspectiveProjection { aspect_ratio: width as f32 / height as f32, ..default() };
+    camera.computed.clip_from_view = bevy::camera::CameraProjection::get_clip_from_view(&lens);
+    camera.computed.target_info = Some(bevy::camera::RenderTargetInfo { physical_size: UVec2::new(width, height), scale_factor: 1.0 });
+    app.world_mut().spawn((camera, GlobalTransform::from(place), PointerCamera));
+    picture(&mut app, 1.0 / 60.0);
+    picture(&mut app, 1.0 / 60.0);
+    let middle = Vec2::new(300.0, 200.0);
+    let events = |app: &mut App, at: Vec2, state: Option<ButtonState>| {
+        app.world_mut().get_mut::<Window>(window).unwrap().set_cursor_position(Some(at));
+        if let Some(state) = state {
+            app.world_mut().write_message(MouseButtonInput { button: MouseButton::Left, state, window });
+        }
+        picture(app, 1.0 / 60.0);
+    };
+    events(&mut app, middle, Some(ButtonState::Pressed));
+    let Some(Held::Thread(grip)) = app.world().resource::<Hand>().held else { panic!("nothing is held") };
+    // Taking hold takes 20 ms.
+    events(&mut app, middle, None);
+    events(&mut app, middle, None);
+    for k in 1..20u16 {
+        let before = end_of(&app, thread);
+        let at = middle + Vec2::new(-0.3 * f32::from(k), -f32::from(k));
+        events(&mut app, at, None);
+        // Where the line of sight of this very event crosses the plane of what is held.
+        let pointer = app.world().resource::<Pointer>();
+        let target = app.world().get::<Grip>(grip).unwrap().target.unwrap().position;
+        let ray = pointer.ray.unwrap();
+        let (from, to) = (space.place_back(ray.origin), space.direction_back(*ray.direction));
+        let t = (target.y - from.y) / to.y;
+        assert!((from + to * t - target).length() < 1e-3 * 0.3, "{} {target}", from + to * t);
+        let now = end_of(&app, thread);
+        assert!((now - target).length() < 0.02 * (before - target).length(), "picture {k}: {now} is not {target}");
+    }
+    events(&mut app, middle, Some(ButtonState::Released));
+    assert_eq!(app.world().resource::<Hand>().held, None);
+}
+
 #[test]
 fn the_hand_takes_a_body_and_leaves_what_is_out_of_reach() {
     let mut app = app();
@@ -140,6 +279,59 @@ fn physics_keeps_real_time_at_any_rate_of_pictures() {
     }
     assert_eq!(app.world().resource::<PhysicsClock>().lost, 0.0);
     assert_eq!(app.world().resource::<PhysicsClock>().frames, 120);
+}
+
+/// The end of a thread is led by a script that counts frames of physics, as a recorded input does. 3 s in pictures of these lengths, over and over;
+/// the state and how much time physics is behind at most.
+fn led(pictures: &[f64]) -> (u64, f64, u64) {
+    let mut app = app();
+    let thread = thread(&mut app);
+    // What is put in is recorded input: a pose for each frame of physics, by its number.
+    app.add_systems(
+        PhysicsFrame,
+        (move |clock: Res<PhysicsClock>, mut sutura: ResMut<Sutura>, threads: Query<&Thread>, mut grip: Local<Option<Handle<sutura::Grip>>>| {
+            let rod = threads.get(thread).unwrap().handle().unwrap();
+            let grip = *grip.get_or_insert_with(|| sutura.edit().insert_grip(&GripSpec::new(rod, Place::End, Hold::Pin)).unwrap());
+            let turn = 0.05 * clock.frames as f64;
+            sutura.edit().set_grip_pose(grip, Pose::at(DVec3::new(0.09 + 0.01 * turn.cos(), 0.0, 0.02 * turn.sin()))).unwrap();
+        })
+        .in_set(PhysicsSet::Drive),
+    );
+    // The first picture of an app has no length.
+    picture(&mut app, 0.0);
+    let (mut real, mut behind) = (0.0, 0.0f64);
+    for seconds in pictures.iter().cycle() {
+        if real + seconds > 3.0 + 1e-9 {
+            break;
+        }
+        picture(&mut app, *seconds);
+        real += seconds;
+        let ahead = app.world().resource::<Sutura>().world().time() - real;
+        assert!(ahead < 1e-4, "physics is {ahead} s ahead");
+        behind = behind.max(-ahead);
+    }
+    let clock = app.world().resource::<PhysicsClock>();
+    assert_eq!(clock.lost, 0.0);
+    (app.world().resource::<Sutura>().world().state_hash(), behind, clock.frames)
+}
+
+#[test]
+fn at_any_rate_of_pictures_the_same_physics_keeps_real_time() {
+    let sixtieth = 1.0 / 60.0;
+    let same = led(&[sixtieth]);
+    assert_eq!(same.2, 180);
+    for rate in [60.0, 10.0, 30.0, 144.0] {
+        let (hash, behind, frames) = led(&[1.0 / rate]);
+        assert_eq!((hash, frames), (same.0, 180), "{rate} pictures a second");
+        assert!(behind < sixtieth, "{rate} pictures a second: {behind} s behind");
+    }
+    // One picture of half a second among quick ones: after it physics is where real time is.
+    let mut slow = vec![sixtieth; 90];
+    slow[30] = 0.5;
+    slow.truncate(1 + 60);
+    let (hash, behind, frames) = led(&[slow.clone(), vec![sixtieth; 90]].concat());
+    assert_eq!((hash, frames), (same.0, 180));
+    assert!(behind < sixtieth, "{behind} s behind");
 }
 
 #[test]

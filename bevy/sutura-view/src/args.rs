@@ -49,7 +49,7 @@ pub struct Args {
     /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.
     #[arg(long, default_value_t = 2.5, value_name = "PIXELS")]
     pub least_width: f32,
-    /// Try the window: show panels and overlays, press every key once, click here and there, and close it.
+    /// Try the window: whether time goes on with all panels shown, files are written and opened, keys and mouse do what they should; then close it.
     #[arg(long = "try", conflicts_with = "headless")]
     pub trial: bool,
     /// Begin paused.

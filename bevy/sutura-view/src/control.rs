@@ -8,10 +8,9 @@ use bevy::prelude::*;
 use bevy::render::view::screenshot::{Screenshot, save_to_disk};
 use bevy::window::{FileDragAndDrop, PrimaryWindow};
 use std::path::PathBuf;
-use sutura_bevy::sutura;
 use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::{Hold, Place, Pose};
-use sutura_bevy::{Grip, Live, PhysicsClock, Space, Strand, Sutura, Thread};
+use sutura_bevy::{Body, Grip, Hand, Live, Part, PhysicsClock, Simulation as _, Space, Strand, Sutura, Thread};
 use sutura_scene::export::{Exporter, Format, Moment, Options};
 use sutura_scene::samples;
 
@@ -155,6 +154,7 @@ fn act_once(world: &mut World, action: Action) {
         Action::Latest => go_to(world, f64::INFINITY),
         Action::Home => world.resource_mut::<Orbit>().go_home(),
         Action::Take(side) => take(world, side),
+        Action::GiveBack => give_back(world),
         Action::Picture => {
             let viewer = world.resource::<Viewer>();
             let path = viewer.folder.join(format!("{}.png", unique(&viewer.folder)));
@@ -274,28 +274,18 @@ fn take(world: &mut World, side: usize) {
         return;
     };
     let place = if side == 0 { Place::Start } else { Place::End };
-    let scenes = held_by_scene(world, thread, side);
-    let grip = match scenes {
+    let sutura = world.resource::<Sutura>();
+    let theirs = world.get::<Thread>(thread).and_then(Thread::handle).and_then(|rod| {
+        let end = if side == 0 { 0 } else { sutura.world().rod(rod).ok()?.n_elements() };
+        let grip = sutura.simulation::<Play>()?.grip_at(rod, end)?;
+        Some((grip, sutura.world().grip_pose(grip).ok()?))
+    });
+    let grip = match theirs {
         Some((handle, pose)) => Grip::of(thread, handle, pose),
         None => Grip::new(thread, place, Hold::Clamp),
     };
     let entity = world.spawn(grip).id();
     world.resource_mut::<Viewer>().grips[side] = Some(entity);
-}
-
-/// A grip of the engine.
-type Held = sutura::Handle<sutura::Grip>;
-
-/// The grip of the scene that holds this end of the thread.
-fn held_by_scene(world: &World, thread: Entity, side: usize) -> Option<(Held, Pose)> {
-    let sutura = world.resource::<Sutura>();
-    let rod = sutura.world().rod(world.get::<Thread>(thread)?.handle()?).ok()?;
-    let x = rod.positions();
-    let (end, next) = if side == 0 { (x[0], x[1]) } else { (x[x.len() - 1], x[x.len() - 2]) };
-    let held = sutura.simulation::<Play>()?.0.grips().filter_map(|(_, h)| h).collect::<Vec<_>>();
-    // A jaw holds the middle of the last element.
-    let near = |p: DVec3| p.distance(end).min(p.distance((end + next) * 0.5)) < 1e-6 + 1e-3 * end.distance(next);
-    held.into_iter().filter_map(|h| Some((h, sutura.world().grip_pose(h).ok()?))).find(|(_, pose)| near(pose.position))
 }
 
 /// Before each frame of physics the keys move their grips.
@@ -306,12 +296,13 @@ pub fn drive(
     clock: Res<PhysicsClock>,
     orbit: Res<Orbit>,
     space: Res<Space>,
+    hand: Res<Hand>,
     mut grips: Query<&mut Grip>,
 ) {
     for side in 0..2 {
         let Some(mut grip) = viewer.grips[side].and_then(|g| grips.get_mut(g).ok()) else { continue };
         if let Some(e) = grip.error() {
-            viewer.message = format!("grip {}: {e}", if side == 0 { "A" } else { "B" });
+            viewer.message = format!("grip {}: {e}", NAMES[side]);
             continue;
         }
         if grip.handle().is_none() || typing.0 {
@@ -322,11 +313,10 @@ pub fn drive(
         let axis = |v: Vec3| space.direction_back(v);
         let way = axis(orbit.right()) * (down[1] - down[0]) + axis(orbit.above()) * (down[3] - down[2]) + axis(orbit.forward()) * (down[4] - down[5]);
         let twist = (down[7] - down[6]) * 3.0 * fast * clock.frame;
+        (grip.limits.speed, grip.limits.force) = (hand.speed_limit, hand.force_limit);
         if way == DVec3::ZERO && twist == 0.0 {
             continue;
         }
-        // A force does not turn: what twists is moved as it is told.
-        grip.yields = twist == 0.0;
         let pose = grip.pose();
         let step = way.normalize_or_zero() * (viewer.grip_speed * fast * clock.frame * f64::from(clock.remaining.max(1)));
         let about = DQuat::from_axis_angle(pose.orientation * DVec3::Z, twist * f64::from(clock.remaining.max(1)));
@@ -334,13 +324,50 @@ pub fn drive(
     }
 }
 
-/// A grip that no key moves any more stays where it is.
-pub fn settle(viewer: Res<Viewer>, mut grips: Query<&mut Grip>) {
-    for entity in viewer.grips.iter().flatten() {
-        if let Ok(mut grip) = grips.get_mut(*entity) {
-            (grip.target, grip.yields) = (None, true);
+/// A grip that no key moves any more stays where it is, and one that the scene let go is nobody's.
+pub fn settle(mut commands: Commands, mut viewer: ResMut<Viewer>, sutura: Res<Sutura>, hand: Res<Hand>, mut grips: Query<&mut Grip>) {
+    for side in 0..2 {
+        let Some(entity) = viewer.grips[side] else { continue };
+        if let Ok(mut grip) = grips.get_mut(entity) {
+            grip.target = None;
+            if grip.handle().is_some_and(|h| sutura.world().grip_pose(h).is_err()) {
+                viewer.grips[side] = None;
+                viewer.message = format!("the scene let go of what grip {} held", NAMES[side]);
+                commands.entity(entity).despawn();
+            }
         }
     }
+    if let Some(sutura_bevy::Held::Thread(grip)) = hand.held
+        && let Some(e) = grips.get(grip).ok().and_then(Grip::error)
+    {
+        viewer.message = format!("the hand does not hold: {e}");
+    }
+}
+
+/// The grips of the keyboard.
+const NAMES: [&str; 2] = ["A", "B"];
+
+/// Speed at which what was taken over goes back to where the scene has it \[m/s\].
+const BACK: f64 = 0.05;
+
+/// What hands took over of the scene, and hold no longer, goes back to it.
+fn give_back(world: &mut World) {
+    let held: Vec<Part> = {
+        let hand = match world.resource::<Hand>().held {
+            Some(sutura_bevy::Held::Thread(e) | sutura_bevy::Held::Body(e)) => Some(e),
+            None => None,
+        };
+        let entities = world.resource::<Viewer>().grips.into_iter().flatten().chain(hand);
+        let part = |e: Entity| world.get::<Grip>(e).and_then(Grip::handle).map(Part::Grip).or(world.get::<Body>(e).and_then(Body::handle).map(Part::Body));
+        entities.filter_map(part).collect()
+    };
+    let mut sutura = world.resource_mut::<Sutura>();
+    let Some(play) = sutura.simulation_mut::<Play>() else { return };
+    let n = play.give_back(&held, BACK);
+    world.resource_mut::<Viewer>().message = match n {
+        0 => "there is nothing to give back to the scene".into(),
+        _ => format!("given back to the scene: {n}"),
+    };
 }
 
 /// Strands show the tension where that is wanted; its scale follows what there is.

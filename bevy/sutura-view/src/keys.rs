@@ -41,6 +41,8 @@ pub enum Action {
     Help,
     /// Takes or lets go with grip A (0) or B (1).
     Take(usize),
+    /// What was taken over of the scene goes back to it.
+    GiveBack,
     /// Writes a picture.
     Picture,
     /// Begins or ends a sequence of pictures.
@@ -76,6 +78,7 @@ pub const KEYS: &[(KeyCode, &str, &str, Action)] = &[
     (KeyCode::KeyB, "B", "which knot it is", Action::Knot),
     (KeyCode::Digit1, "1", "grip A takes the start of the first thread, or lets go", Action::Take(0)),
     (KeyCode::Digit2, "2", "grip B takes the end of the last thread, or lets go", Action::Take(1)),
+    (KeyCode::KeyG, "G", "give back to the scene what was taken over and is held no more", Action::GiveBack),
     (KeyCode::F5, "F5", "write what was done so far (sutura replay)", Action::Input),
     (KeyCode::F9, "F9", "write what was shown so far as GLB", Action::Glb),
     (KeyCode::F11, "F11", "begin or end a sequence of pictures", Action::Sequence),

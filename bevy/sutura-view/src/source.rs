@@ -1,15 +1,32 @@
 //! What is shown: a scene that is played, or a recorded trajectory.
 
 use std::path::Path;
-use sutura_bevy::Simulation;
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::input::{Recorder, Recording};
 use sutura_bevy::sutura::skin::SkinSpec;
-use sutura_bevy::sutura::{Incident, Profile, World};
-use sutura_scene::{Runner, Scene, Thread, Trajectory, samples};
+use sutura_bevy::sutura::{Grip, Handle, Incident, Profile, Rod, World};
+use sutura_bevy::{Part, Simulation};
+use sutura_scene::{Mover, Runner, Scene, Thread, Trajectory, samples};
 
 /// A scene that is played. When its phases are over the world goes on by itself, for hands from outside.
 pub struct Play(pub Runner);
+
+impl Play {
+    /// The thing of the scene that this is.
+    fn mover(&self, part: Part) -> Option<Mover> {
+        match part {
+            Part::Grip(grip) => self.0.grips().position(|g| g.1 == Some(grip)).map(Mover::Grip),
+            Part::Body(body) => self.0.shapes().position(|s| s.1 == body).map(Mover::Shape),
+        }
+    }
+    /// Everything that was taken over goes back to where the scene has it, no faster than this \[m/s\], but what is held still; how many things do.
+    pub fn give_back(&mut self, held: &[Part], speed: f64) -> usize {
+        let held: Vec<Mover> = held.iter().filter_map(|p| self.mover(*p)).collect();
+        let lent: Vec<Mover> = self.0.lent().filter(|m| !held.contains(m)).collect();
+        lent.iter().for_each(|m| self.0.give_back(*m, speed));
+        lent.len()
+    }
+}
 
 impl Simulation for Play {
     fn world(&self) -> &World {
@@ -21,13 +38,32 @@ impl Simulation for Play {
     fn recording(&self) -> Option<&Recording> {
         self.0.recording_so_far()
     }
-    fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident> {
+    fn step(&mut self, _dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident> {
         if self.0.now().finished {
-            drive(self.0.edit(), 1.0);
-            return self.0.edit().step(dt).incidents;
+            return self.0.step_beyond(drive);
         }
         self.0.step_frame_with(drive);
         Vec::new()
+    }
+    fn hold(&mut self, part: Part, held: bool) -> bool {
+        let Some(what) = self.mover(part) else { return false };
+        if held {
+            return self.0.lend(what);
+        }
+        self.0.leave(what);
+        true
+    }
+    fn grip_at(&self, thread: Handle<Rod>, particle: usize) -> Option<Handle<Grip>> {
+        let world = self.0.world();
+        let x = world.rod(thread).ok()?.positions();
+        // A jaw holds the middle of an element.
+        let near = |p: DVec3| {
+            let at = |i: usize| x.get(i).copied();
+            let length = at(particle + 1).or(at(particle.wrapping_sub(1)))?.distance(at(particle)?);
+            let middles = [particle.wrapping_sub(1), particle].map(|i| Some((at(i)? + at(i + 1)?) * 0.5));
+            Some(middles.into_iter().flatten().chain(at(particle)).any(|q| p.distance(q) < 1e-3 * length))
+        };
+        self.0.grips().filter_map(|(_, h)| h).find(|h| world.grip_pose(*h).ok().and_then(|pose| near(pose.position)) == Some(true))
     }
 }
 

@@ -275,6 +275,171 @@ fn keys_take_two_ends_and_move_them() {
     assert!(app.world().resource::<Viewer>().grips[0].is_none() && app.world().resource::<Viewer>().grips[1].is_some());
 }
 
+/// A thread between a grip that the scene moves to and fro, and one that it lets rest; a bar that it moves.
+const TAKEN: &str = r#"
+[solver]
+gravity = [0, 0, 0]
+linear_damping = 0.9
+[[thread]]
+name = "thread"
+diameter = "0.4 mm"
+young_modulus = "0.1 GPa"
+density = "1150 kg/m^3"
+elements = 40
+line = { from = [0, 0, 0], to = "[100, 0, 0] mm" }
+[[shape]]
+name = "bar"
+kind = "sphere"
+radius = "5 mm"
+position = "[50, 0, 40] mm"
+[[grip]]
+name = "left"
+at = "start"
+hold = "pin"
+[[grip]]
+name = "right"
+at = "end"
+hold = "pin"
+[[phase]]
+name = "one"
+duration = "4 s"
+action = [
+  { move = "right", keys = [{ to = "[80, 0, 0] mm", duration = "2 s" }] },
+  { move = "bar", keys = [{ to = "[50, 0, 60] mm", duration = "2 s" }] },
+]
+[[phase]]
+name = "two"
+duration = "3 s"
+action = [{ move = "right", keys = [{ to = "[70, 0, 0] mm", duration = "1 s" }] }]
+"#;
+
+fn incidents(app: &App) -> u64 {
+    let sutura = app.world().resource::<Sutura>();
+    sutura.incidents.len() as u64 + sutura.simulation::<Play>().unwrap().0.incidents().map(|i| i.count).sum::<u64>()
+}
+
+/// Goes on by pictures; the fastest that the thing moved \[m/s\].
+fn fastest(app: &mut App, pictures: u32, at: &dyn Fn(&App) -> DVec3) -> f64 {
+    let mut most = 0.0f64;
+    for _ in 0..pictures {
+        let before = at(app);
+        app.update();
+        most = most.max((at(app) - before).length() * 60.0);
+    }
+    most
+}
+
+#[test]
+fn what_is_taken_over_stays_where_it_was_left_and_goes_back_without_a_jump() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("taken.toml");
+    std::fs::write(&scene, TAKEN).unwrap();
+    let mut app = app(scene.to_str().unwrap(), folder.path());
+    assert_eq!(app.world().resource::<Stage>().error, None);
+    let right = |app: &App| {
+        let play = app.world().resource::<Sutura>().simulation::<Play>().unwrap();
+        let (_, grip) = play.0.grips().find(|g| g.0 == "right").unwrap();
+        play.0.world().grip_pose(grip.unwrap()).unwrap().position
+    };
+    let bar = |app: &App| app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.shape_poses().next().unwrap().position;
+    let time = |app: &App| app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.time();
+    // In the middle of its motion the keys take the grip over: it stands, then goes where they lead it.
+    fastest(&mut app, 30, &right);
+    press(&mut app, KeyCode::Digit2);
+    let taken = right(&app);
+    assert!(fastest(&mut app, 10, &right) < 1e-9);
+    key(&mut app, KeyCode::KeyI, ButtonState::Pressed);
+    let fast = fastest(&mut app, 30, &right);
+    key(&mut app, KeyCode::KeyI, ButtonState::Released);
+    assert!((0.9..1.01).contains(&(fast / app.world().resource::<Viewer>().grip_speed)), "{fast}");
+    app.update();
+    let led = right(&app) - taken;
+    assert!(led.z > 0.008, "{led}");
+    // Let go, it stays there, though the scene's motion goes on.
+    press(&mut app, KeyCode::Digit2);
+    assert!(fastest(&mut app, 20, &right) < 1e-9);
+    assert!(time(&app) < 2.0);
+    // Given back, it goes to where the scene has it, smoothly: no faster than 5 cm/s beside the scene's own motion (at most 19 mm/s).
+    press(&mut app, KeyCode::KeyG);
+    let fast = fastest(&mut app, 60, &right);
+    assert!(fast > 0.01 && fast < 0.05 + 0.019, "{fast}");
+    while time(&app) < 2.1 {
+        app.update();
+    }
+    assert!((right(&app) - DVec3::new(0.08, 0.0, 0.0)).length() < 1e-7, "{}", right(&app));
+    // Taken again, and left: the next phase moves it from where it is.
+    press(&mut app, KeyCode::Digit2);
+    key(&mut app, KeyCode::KeyI, ButtonState::Pressed);
+    fastest(&mut app, 20, &right);
+    key(&mut app, KeyCode::KeyI, ButtonState::Released);
+    app.update();
+    press(&mut app, KeyCode::Digit2);
+    let left = right(&app);
+    assert!(left.z > 0.005 && time(&app) < 4.0, "{left} {}", time(&app));
+    let mut fast = 0.0f64;
+    while time(&app) < 5.2 {
+        fast = fast.max(fastest(&mut app, 1, &right));
+    }
+    assert!((right(&app) - DVec3::new(0.07, 0.0, 0.0)).length() < 1e-7, "{}", right(&app));
+    assert!(fast < 2.0 * (left - right(&app)).length(), "{fast}");
+    // The same with the bar, by the mouse.
+    let space = *app.world().resource::<Space>();
+    let look = |app: &mut App, at: DVec3, pressed: bool| {
+        let ray = Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
+        let mut pointer = app.world_mut().resource_mut::<Pointer>();
+        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) = (Some(ray), space.direction(DVec3::Y), pressed, 0.002);
+        app.update();
+    };
+    let home = bar(&app);
+    look(&mut app, home, true);
+    assert!(matches!(app.world().resource::<Hand>().held, Some(Held::Body(_))));
+    for k in 1..=30 {
+        look(&mut app, home + DVec3::X * 0.0005 * f64::from(k), true);
+    }
+    look(&mut app, home, false);
+    assert!((bar(&app) - home - DVec3::X * 0.015).length() < 1e-6);
+    assert!(fastest(&mut app, 20, &bar) < 1e-9);
+    // The scene is over: it is given back all the same.
+    while !app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.now().finished {
+        app.update();
+    }
+    press(&mut app, KeyCode::KeyG);
+    let fast = fastest(&mut app, 60, &bar);
+    assert!(fast > 0.03 && fast < 0.0501, "{fast}");
+    assert!((bar(&app) - home).length() < 1e-9);
+    assert_eq!(app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.lent().count(), 0);
+    assert_eq!(incidents(&app), 0);
+    // All of it is done again bit for bit.
+    let sutura = app.world().resource::<Sutura>();
+    let bytes = sutura.recording().unwrap().to_bytes();
+    let again = Recording::from_bytes(&bytes).unwrap().replay(&mut |step| {
+        assert!(step.is_same(), "step {}", step.step);
+        std::ops::ControlFlow::Continue(())
+    });
+    assert_eq!(again.unwrap().state_hash(), sutura.world().state_hash());
+}
+
+#[test]
+fn a_key_moves_its_grip_in_the_physics_of_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    press(&mut app, KeyCode::Digit1);
+    let pose = |app: &App| app.world().get::<Grip>(app.world().resource::<Viewer>().grips[0].unwrap()).unwrap().pose().position;
+    let (before, frames) = (pose(&app), app.world().resource::<PhysicsClock>().frames);
+    key(&mut app, KeyCode::KeyW, ButtonState::Pressed);
+    app.update();
+    let clock = app.world().resource::<PhysicsClock>();
+    assert_eq!(clock.frames, frames + 1);
+    let wanted = app.world().resource::<Viewer>().grip_speed * clock.frame;
+    let moved = (pose(&app) - before).length();
+    assert!((moved / wanted - 1.0).abs() < 0.05, "{moved} of {wanted}");
+    // And stops with it.
+    key(&mut app, KeyCode::KeyW, ButtonState::Released);
+    let there = pose(&app);
+    app.update();
+    assert!((pose(&app) - there).length() < 1e-9);
+}
+
 #[test]
 fn the_present_is_written_as_glb() {
     let folder = tempfile::tempdir().unwrap();

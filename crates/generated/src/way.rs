@@ -188,6 +188,7 @@ impl Way {
         let s = self.scale;
         let drive = match grip.drive {
             Drive::Force { direction, force, speed_limit } => Drive::Force { direction: self.direction(direction), force: force * s * s, speed_limit },
+            Drive::Hand { direction, force, speed_limit } => Drive::Hand { direction: self.direction(direction), force: force * s * s, speed_limit },
             Drive::Pose => Drive::Pose,
         };
         Held {

@@ -33,7 +33,7 @@ pub use report::{
 };
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};
-pub use scene::{Camera, Scene};
+pub use scene::{Camera, Mover, Scene};
 pub use table::{TableError, points_from_table};
 pub use trajectory::{Contact, Forces, Frame, Header, OnThread, SectionOutline, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory, TrajectoryError};
 pub use units::in_si;

@@ -4,7 +4,7 @@ use crate::error::SceneError;
 use crate::report::{
     Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
 };
-use crate::scene::{End, Late, MOST_FRAMES, Moment, Scene};
+use crate::scene::{End, Late, MOST_FRAMES, Moment, Mover, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
 use crate::trajectory::{Contact, Forces, Frame, Header, OnThread, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory};
 use crate::watch::{Check, Probe, profile};
@@ -13,7 +13,7 @@ use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{ContactWith, Grip, Handle, IncidentKind, Pose, Rod, RodView, World};
+use sutura::{ContactWith, Grip, Handle, Incident, IncidentKind, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -140,7 +140,7 @@ impl Runner {
     }
 
     /// The same with a hand from outside: before each piece of the frame `drive` gets the world and the part of the frame that will be done with
-    /// that piece. What it does is recorded like everything else; where the scene moves the same thing, the scene does.
+    /// that piece. What it does is recorded like everything else. What the scene moves itself is to be lent before ([`Runner::lend`]).
     pub fn step_frame_with(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Progress {
         if !self.finished {
             let (report, cpu, stuck) = self.simulate(drive);
@@ -166,25 +166,71 @@ impl Runner {
         self.progress()
     }
 
+    /// A frame of the world after the run is over, for hands from outside. Nothing of it is in the report; what went wrong comes back.
+    pub fn step_beyond(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident> {
+        let dt = 1.0 / self.scene.frame_rate;
+        let pieces = self.pieces(dt);
+        let mut incidents = Vec::new();
+        for k in 1..=pieces {
+            drive(&mut self.stage.world, f64::from(k) / f64::from(pieces));
+            if let Err(e) = self.stage.bring_back(self.stage.time, dt / f64::from(pieces)) {
+                self.incident(None, e.to_string());
+            }
+            incidents.extend(self.stage.world.step(dt / f64::from(pieces)).incidents);
+        }
+        incidents
+    }
+
+    /// Somebody else moves this from here on, as a hand that takes it over: it stands still until they do, and the scene's own motion of it goes on
+    /// without it. Whether there is such a thing now.
+    pub fn lend(&mut self, what: Mover) -> bool {
+        let lent = self.stage.lend(what);
+        lent.unwrap_or_else(|e| {
+            self.incident(None, e.to_string());
+            false
+        })
+    }
+    /// They move it no longer: it stays there until it is given back, or until the scene begins another motion of it.
+    pub fn leave(&mut self, what: Mover) {
+        if let Err(e) = self.stage.leave(what) {
+            self.incident(None, e.to_string());
+        }
+    }
+    /// It goes back to where the scene has it, smoothly and no faster than `speed` \[m/s\] beside what the scene moves it by.
+    pub fn give_back(&mut self, what: Mover, speed: f64) {
+        if let Err(e) = self.stage.give_back(what, speed) {
+            self.incident(None, e.to_string());
+        }
+    }
+    /// What the scene does not have: in another hand, left by it, or on its way back.
+    pub fn lent(&self) -> impl Iterator<Item = Mover> {
+        self.stage.lent()
+    }
+
     fn give_up(&mut self, why: String) {
         self.incident(None, why);
         self.end_phase("given up");
         (self.late, self.finished) = (true, true);
     }
 
+    /// Pieces in which a frame is done: what moves is sampled at every substep, so that its path does not depend on the frame rate.
+    fn pieces(&self, dt: f64) -> u32 {
+        let substep = self.stage.world.settings().substep;
+        if self.stage.is_driven() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 }
+    }
+
     /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.
     fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> (FrameReport, f64, bool) {
         let dt = 1.0 / self.scene.frame_rate;
         let begin = self.frame as f64 * dt;
-        // What moves is sampled at every substep, so that its path does not depend on the frame rate.
-        let substep = self.stage.world.settings().substep;
-        let pieces = if self.stage.is_driven() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 };
+        let pieces = self.pieces(dt);
         let mut report = FrameReport { converged: true, ..FrameReport::default() };
         let (mut cpu, mut stuck) = (Duration::ZERO, false);
         for k in 1..=pieces {
             let at = begin + dt * f64::from(k) / f64::from(pieces);
             drive(&mut self.stage.world, f64::from(k) / f64::from(pieces));
-            if let Err(e) = self.stage.drive(at) {
+            let moved = self.stage.drive(at);
+            if let Err(e) = moved.and(self.stage.bring_back(at, dt / f64::from(pieces))) {
                 self.incident(None, e.to_string());
             }
             let Stage { world, judge, .. } = &mut self.stage;

@@ -98,10 +98,12 @@ pub(crate) struct ReelDef {
     pub location: Location,
 }
 
-/// A thing that moves.
+/// A thing of a scene that can be moved, by its number there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Mover {
+pub enum Mover {
+    /// A grip.
     Grip(usize),
+    /// A shape.
     Shape(usize),
 }
 

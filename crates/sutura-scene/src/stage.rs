@@ -13,7 +13,7 @@ use std::sync::Mutex;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::Recorder;
 use sutura::knot::Entries;
-use sutura::math::log;
+use sutura::math::{exp, log};
 use sutura::{
     Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
 };
@@ -44,6 +44,41 @@ struct Moving {
     /// Its last pose was given to the world.
     done: bool,
 }
+
+/// What moves a thing that may be moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    /// Nothing, ever.
+    Fixed,
+    /// Poses.
+    Posed,
+    /// A force along a line: direction, force \[N\], speed limit \[m/s\].
+    Pushed(DVec3, f64, f64),
+}
+
+/// A thing that somebody else moves, or has moved. The scene's own motion of it goes on meanwhile, unseen.
+struct Lent {
+    what: Mover,
+    /// What moves it in the scene.
+    way: Way,
+    /// Where the scene has it while no motion of it is under way.
+    place: Pose,
+    state: LentState,
+}
+
+enum LentState {
+    /// In the other hand.
+    Held,
+    /// It stays where that hand left it.
+    Left,
+    /// On its way back: how far off it was, the time for the way and the part of that which has passed \[s\].
+    Back { off: Pose, span: f64, passed: f64 },
+}
+
+/// Fastest turn of a thing on its way back \[rad/s\].
+const BACK_TURN: f64 = 3.0;
+/// Greatest slope of [`quintic`].
+const QUINTIC_SLOPE: f64 = 1.875;
 
 /// A number that grows to its new value.
 struct Ramp {
@@ -105,6 +140,7 @@ pub struct Stage {
     grips: Vec<Option<Held>>,
     loads: Vec<Option<Acting>>,
     moving: Vec<Moving>,
+    lent: Vec<Lent>,
     ramps: Vec<Ramp>,
     /// Everything that gave or took a handle, for saved states.
     events: Vec<Event>,
@@ -176,6 +212,7 @@ impl Stage {
             grips: vec![None; scene.grips.len()],
             loads: vec![None; scene.loads.len()],
             moving: Vec::new(),
+            lent: Vec::new(),
             ramps: Vec::new(),
             events: Vec::new(),
             time: 0.0,
@@ -240,14 +277,7 @@ impl Stage {
             Action::LetGo { grip } => self.let_go(*grip),
             Action::Move { what, plan } => {
                 let Some(start) = self.pose_of(*what) else { return Ok(()) };
-                match what {
-                    Mover::Grip(i) => {
-                        if let Some(held) = self.grips[*i] {
-                            self.world.set_grip_drive(held.handle, Drive::Pose)?;
-                        }
-                    }
-                    Mover::Shape(i) => self.world.set_shape_motion(self.shapes[*i], ShapeMotion::Driven)?,
-                }
+                self.set_way(*what, Way::Posed)?;
                 let taken = if let Mover::Grip(i) = what { self.grips[*i].map_or(start, |h| h.taken) } else { start };
                 let motion = plan.motion(start, taken, |s| self.shape_pose(s));
                 self.stop_motion(*what);
@@ -256,24 +286,11 @@ impl Stage {
             }
             Action::Rest { what } => {
                 self.stop_motion(*what);
-                match what {
-                    Mover::Grip(i) => match self.grips[*i] {
-                        Some(held) => self.world.set_grip_drive(held.handle, Drive::Pose),
-                        None => Ok(()),
-                    },
-                    Mover::Shape(i) => self.world.set_shape_motion(self.shapes[*i], ShapeMotion::Driven),
-                }
+                self.set_way(*what, Way::Posed)
             }
             Action::Push { what, direction, force, speed_limit } => {
-                let (direction, force, speed_limit) = (*direction, *force, *speed_limit);
                 self.stop_motion(*what);
-                match what {
-                    Mover::Grip(i) => match self.grips[*i] {
-                        Some(held) => self.world.set_grip_drive(held.handle, Drive::Force { direction, force, speed_limit }),
-                        None => Ok(()),
-                    },
-                    Mover::Shape(i) => self.world.set_shape_motion(self.shapes[*i], ShapeMotion::Pushed { direction, force, speed_limit }),
-                }
+                self.set_way(*what, Way::Pushed(*direction, *force, *speed_limit))
             }
             Action::Load { load, thread, kind, ramp } => {
                 self.ramps.retain(|r| !matches!(r.what, Growing::Load { load: l, .. } if l == *load));
@@ -338,6 +355,7 @@ impl Stage {
     }
     fn let_go(&mut self, grip: usize) -> Result<(), Error> {
         self.stop_motion(Mover::Grip(grip));
+        self.lent.retain(|l| l.what != Mover::Grip(grip));
         if let Some(held) = self.grips[grip].take() {
             self.world.remove_grip(held.handle)?;
             self.events.push(Event::LetGo { grip: self.names.grips[grip].clone() });
@@ -382,13 +400,131 @@ impl Stage {
 
     // ---- motion ----
 
+    /// The scene wants a thing to be moved this way from here on. What another hand holds it only remembers; what that hand has left it takes back.
+    fn set_way(&mut self, what: Mover, way: Way) -> Result<(), Error> {
+        let now = self.pose_of(what);
+        if let Some(lent) = self.lent.iter_mut().find(|l| l.what == what) {
+            if matches!(lent.state, LentState::Held) {
+                (lent.way, lent.place) = (way, now.unwrap_or(lent.place));
+                return Ok(());
+            }
+            self.lent.retain(|l| l.what != what);
+        }
+        self.put_way(what, way)
+    }
+    fn put_way(&mut self, what: Mover, way: Way) -> Result<(), Error> {
+        match what {
+            Mover::Grip(i) => {
+                let Some(held) = self.grips[i] else { return Ok(()) };
+                let drive = match way {
+                    Way::Fixed | Way::Posed => Drive::Pose,
+                    Way::Pushed(direction, force, speed_limit) => Drive::Force { direction, force, speed_limit },
+                };
+                self.world.set_grip_drive(held.handle, drive)
+            }
+            Mover::Shape(i) => {
+                let motion = match way {
+                    Way::Fixed => ShapeMotion::Fixed,
+                    Way::Posed => ShapeMotion::Driven,
+                    Way::Pushed(direction, force, speed_limit) => ShapeMotion::Pushed { direction, force, speed_limit },
+                };
+                self.world.set_shape_motion(self.shapes[i], motion)
+            }
+        }
+    }
+    fn way_of(&self, what: Mover) -> Option<Way> {
+        Some(match what {
+            Mover::Grip(i) => match self.world.grip_drive(self.grips[i]?.handle).ok()? {
+                Drive::Pose => Way::Posed,
+                Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
+            },
+            Mover::Shape(i) => match self.world.shape(self.shapes[i]).ok()?.motion {
+                ShapeMotion::Fixed => Way::Fixed,
+                ShapeMotion::Driven => Way::Posed,
+                ShapeMotion::Pushed { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
+            },
+        })
+    }
+
+    /// Somebody else moves a thing from here on; it stands still until they do. Whether there is such a thing.
+    pub fn lend(&mut self, what: Mover) -> Result<bool, Error> {
+        let (Some(way), Some(place)) = (self.way_of(what), self.pose_of(what)) else { return Ok(false) };
+        match self.lent.iter_mut().find(|l| l.what == what) {
+            Some(lent) => lent.state = LentState::Held,
+            None => self.lent.push(Lent { what, way, place, state: LentState::Held }),
+        }
+        self.put_way(what, Way::Posed)?;
+        Ok(true)
+    }
+    /// They do so no longer: it stays there.
+    pub fn leave(&mut self, what: Mover) -> Result<(), Error> {
+        let Some(lent) = self.lent.iter_mut().find(|l| l.what == what) else { return Ok(()) };
+        lent.state = LentState::Left;
+        self.put_way(what, Way::Posed)
+    }
+    /// It goes back to where the scene has it, no faster than `speed` \[m/s\] beside what the scene moves it by; what the scene pushes by a force is
+    /// pushed at once.
+    pub fn give_back(&mut self, what: Mover, speed: f64) -> Result<(), Error> {
+        let (Some(k), Some(now)) = (self.lent.iter().position(|l| l.what == what), self.pose_of(what)) else { return Ok(()) };
+        let way = self.lent[k].way;
+        if matches!(way, Way::Pushed(..)) {
+            self.lent.remove(k);
+            return self.put_way(what, way);
+        }
+        let wanted = self.wanted(&self.lent[k], self.time);
+        let turn = now.orientation * wanted.orientation.conjugate();
+        let off = Pose::new(now.position - wanted.position, if turn.w < 0.0 { -turn } else { turn });
+        let span = QUINTIC_SLOPE * (off.position.length() / speed.max(1e-6)).max(log(off.orientation).length() / BACK_TURN);
+        self.lent[k].state = LentState::Back { off, span, passed: 0.0 };
+        self.put_way(what, Way::Posed)
+    }
+    /// Everything that the scene does not have.
+    pub fn lent(&self) -> impl Iterator<Item = Mover> {
+        self.lent.iter().map(|l| l.what)
+    }
+
+    /// Where the scene has a thing that it lent.
+    fn wanted(&self, lent: &Lent, time: f64) -> Pose {
+        self.moving.iter().find(|m| m.what == lent.what).map_or(lent.place, |m| m.motion.pose(time - m.begin))
+    }
+    fn put_pose(&mut self, what: Mover, pose: Pose) -> Result<(), Error> {
+        match what {
+            Mover::Grip(i) => self.grips[i].map_or(Ok(()), |held| self.world.set_grip_pose(held.handle, pose)),
+            Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
+        }
+    }
+    /// What is on its way back goes on by `dt`; the scene has it at `time`.
+    pub fn bring_back(&mut self, time: f64, dt: f64) -> Result<(), Error> {
+        let mut lent = std::mem::take(&mut self.lent);
+        let mut result = Ok(());
+        lent.retain_mut(|l| {
+            let wanted = self.wanted(l, time);
+            let LentState::Back { off, span, passed } = &mut l.state else { return true };
+            *passed += dt;
+            let left = if *passed < *span { 1.0 - quintic(*passed / *span) } else { 0.0 };
+            let turn = exp(log(off.orientation) * left);
+            let pose = Pose::new(wanted.position + off.position * left, (turn * wanted.orientation).normalize());
+            let set = self.put_pose(l.what, pose);
+            result = std::mem::replace(&mut result, Ok(())).and(set);
+            // It arrived with the substep before.
+            let there = *passed >= *span + dt;
+            if there {
+                let set = if l.way == Way::Posed { Ok(()) } else { self.put_way(l.what, l.way) };
+                result = std::mem::replace(&mut result, Ok(())).and(set);
+            }
+            !there
+        });
+        self.lent = lent;
+        result
+    }
+
     /// Whether anything changes from substep to substep.
     pub fn is_driven(&self) -> bool {
-        !self.ramps.is_empty() || self.moving.iter().any(|m| !m.done)
+        !self.is_done() || self.lent.iter().any(|l| matches!(l.state, LentState::Back { .. }))
     }
-    /// Whether nothing that was begun is still under way.
+    /// Whether nothing that the scene began is still under way.
     pub fn is_done(&self) -> bool {
-        !self.is_driven()
+        self.ramps.is_empty() && self.moving.iter().all(|m| m.done)
     }
     /// Gives the world the poses and loads wanted at a time.
     pub fn drive(&mut self, time: f64) -> Result<(), Error> {
@@ -396,13 +532,11 @@ impl Stage {
         let mut result = Ok(());
         for m in moving.iter_mut().filter(|m| !m.done) {
             let t = time - m.begin;
-            let pose = m.motion.pose(t);
             m.done = t >= m.motion.duration() - 1e-12;
-            let set = match m.what {
-                Mover::Grip(i) => self.grips[i].map_or(Ok(()), |held| self.world.set_grip_pose(held.handle, pose)),
-                Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
-            };
-            result = result.and(set);
+            if self.lent.iter().all(|l| l.what != m.what) {
+                let set = self.put_pose(m.what, m.motion.pose(t));
+                result = result.and(set);
+            }
         }
         self.moving = moving;
         let ramps = std::mem::take(&mut self.ramps);

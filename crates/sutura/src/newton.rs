@@ -5,7 +5,7 @@
 //! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. For inextensible
 //! rods that multiplier also enters the residual (method of multipliers); its penalty is 100 EA.
 
-use crate::math::{exp, outer};
+use crate::math::exp;
 use crate::model::Model;
 use crate::model::grip::Hold;
 use crate::model::rod::RodModel;
@@ -235,10 +235,9 @@ fn restrict(state: &State, scratch: &mut Scratch) {
         if freedom == Freedom::Free {
             continue;
         }
-        if let Freedom::Line { direction, force, damper, from } = freedom {
-            let moved = direction.dot(state.position[node / 2] - from);
-            scratch.system.diagonal[node] += outer(direction, direction) * damper;
-            scratch.rhs[node] += direction * (force - damper * moved);
+        if let Some((stiffness, force)) = freedom.drive(state.position[node / 2]) {
+            scratch.system.diagonal[node] += stiffness;
+            scratch.rhs[node] += force;
         }
         let keep = freedom.projector();
         scratch.system.restrict(node, keep);

@@ -22,13 +22,30 @@ pub(crate) enum Freedom {
         damper: f64,
         from: DVec3,
     },
+    /// Everywhere, with a force \[N\] and a damper that acts in every direction (force per move within the substep, \[N/m\]).
+    /// Its move is counted from `from`.
+    Led {
+        force: DVec3,
+        damper: f64,
+        from: DVec3,
+    },
 }
 
 impl Freedom {
+    /// Stiffness and force of what drives the node at `position`, if something does.
+    pub fn drive(&self, position: DVec3) -> Option<(DMat3, DVec3)> {
+        match *self {
+            Freedom::Free | Freedom::Held => None,
+            Freedom::Line { direction, force, damper, from } => {
+                Some((crate::math::outer(direction, direction) * damper, direction * (force - damper * direction.dot(position - from))))
+            }
+            Freedom::Led { force, damper, from } => Some((DMat3::IDENTITY * damper, force - (position - from) * damper)),
+        }
+    }
     /// Projector on the directions that stay free.
     pub fn projector(&self) -> DMat3 {
         match self {
-            Freedom::Free => DMat3::IDENTITY,
+            Freedom::Free | Freedom::Led { .. } => DMat3::IDENTITY,
             Freedom::Held => DMat3::ZERO,
             Freedom::Line { direction, .. } => crate::math::outer(*direction, *direction),
         }

@@ -175,7 +175,7 @@ pub(crate) use {structure, variants};
 variants!(ReelLaw { 0 => Rate(rate), 1 => Brake(force) });
 variants!(Onset { 0 => Unknown, 1 => Broken, 2 => Smooth });
 variants!(Hold { 0 => Pin, 1 => Clamp, 2 => Jaw });
-variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit } });
+variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit }, 2 => Hand { direction, force, speed_limit } });
 variants!(Place { 0 => Start, 1 => End, 2 => Particle(i), 3 => Element(e), 4 => Arc(s) });
 variants!(LoadKind {
     0 => Point { place, force, torque },

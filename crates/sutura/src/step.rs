@@ -364,7 +364,7 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
         let i = first + grip.index as usize;
         let (line, count) = match grip.drive {
             Drive::Pose => (None, 1.0),
-            Drive::Force { direction, force, speed_limit } => {
+            Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => {
                 let u = if grip.ramp > 0.0 { ((t - grip.taken_at) / grip.ramp).clamp(0.0, 1.0) } else { 1.0 };
                 let force = force * smoothstep(u);
                 (Some((direction, force, force / speed_limit / stage.span)), if grip.hold == Hold::Jaw { 0.5 } else { 1.0 })
@@ -377,7 +377,13 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             }
             Some((direction, force, damper)) if force > 0.0 => {
                 let from = if stage.weights.is_some() { scratch.target[i] - scratch.carried[i] * stage.span } else { scratch.start[i] };
-                scratch.freedom[2 * i] = Freedom::Line { direction, force: force * count, damper: damper * count, from };
+                let (force, damper) = (force * count, damper * count);
+                if matches!(grip.drive, Drive::Hand { .. }) {
+                    scratch.freedom[2 * i] = Freedom::Led { force: direction * force, damper, from };
+                    state.position[i] = scratch.start[i];
+                    return;
+                }
+                scratch.freedom[2 * i] = Freedom::Line { direction, force, damper, from };
                 let along = direction * direction.dot(state.position[i] - scratch.start[i]);
                 state.position[i] = scratch.start[i] + along;
             }
@@ -531,7 +537,7 @@ fn reactions(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
                 grip.force += other;
             }
         }
-        if let Drive::Force { .. } = grip.drive {
+        if grip.drive != Drive::Pose {
             let middle = if grip.hold == Hold::Jaw { (position[i] + position[i + 1]) * 0.5 } else { position[i] };
             grip.pose.position = middle;
             grip.target.position = middle;

@@ -562,6 +562,11 @@ impl World {
         })
     }
 
+    /// What moves a grip.
+    pub fn grip_drive(&self, grip: Handle<Grip>) -> Result<Drive, Error> {
+        Ok(self.state.grips.get(grip).ok_or(GRIP)?.drive)
+    }
+
     /// Force and torque with which the grip acts on the thread, at the last accepted substep.
     pub fn grip_wrench(&self, grip: Handle<Grip>) -> Result<Wrench, Error> {
         let g = self.state.grips.get(grip).ok_or(GRIP)?;

@@ -57,6 +57,16 @@ pub enum Drive {
         /// Speed where nothing resists \[m/s\], > 0.
         speed_limit: f64,
     },
+    /// The same, but it gives way across `direction` too: the grip acts with `force * (direction - velocity / speed_limit)`. So what holds
+    /// it back from wherever, it rests or gives way with no more than `force`; a clamp or jaw does not turn.
+    Hand {
+        /// Direction of the force in the world, a unit vector.
+        direction: DVec3,
+        /// Force wanted \[N\], >= 0.
+        force: f64,
+        /// Speed where nothing resists \[m/s\], > 0.
+        speed_limit: f64,
+    },
 }
 
 /// A grip to take.
@@ -88,7 +98,7 @@ impl GripSpec {
 
 impl Drive {
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        if let Drive::Force { direction, force, speed_limit } = self {
+        if let Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } = self {
             check("grip", "drive.force", *force, *force >= 0.0, "a finite force >= 0 [N]")?;
             check("grip", "drive.speed_limit", *speed_limit, *speed_limit > 0.0, "a finite speed > 0 [m/s]")?;
             if !direction.is_finite() || (direction.length() - 1.0).abs() > 1e-6 {

@@ -5,7 +5,7 @@
 //! added up and become the weld's, which is elimination in another order and loses nothing. The cross-section has no inertia; each frame beside it
 //! is tied to it by half a joint, as to a clamp, so that two ends welded are one thread to second order in the element length.
 
-use crate::math::{exp, outer, skew};
+use crate::math::{exp, skew};
 use crate::model::Model;
 use crate::rod::assemble::clamp_terms;
 use crate::row::border::Border;
@@ -187,11 +187,10 @@ pub(crate) fn gather(model: &Model, state: &State, scratch: &mut Scratch, exact:
             rhs[n] = DVec3::ZERO;
         }
         let place = welds[k].place;
-        if let Freedom::Line { direction, force, damper, from } = place {
-            let i = model.welds.at(welds[k].slot).expect("living").members[0].index(model);
-            let moved = direction.dot(state.position[i] - from);
-            own += outer(direction, direction) * damper;
-            right += direction * (force - damper * moved);
+        let i = model.welds.at(welds[k].slot).expect("living").members[0].index(model);
+        if let Some((stiffness, force)) = place.drive(state.position[i]) {
+            own += stiffness;
+            right += force;
         }
         let keep = place.projector();
         for (node, m) in links.iter() {

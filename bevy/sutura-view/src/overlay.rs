@@ -2,11 +2,12 @@
 
 use crate::control::Viewer;
 use crate::source::Play;
-use crate::stage::{Prop, Stage, Table};
+use crate::stage::{Prop, Stage, Table, place};
 use bevy::prelude::*;
 use sutura_bevy::sutura::glam::DVec3;
-use sutura_bevy::sutura::{Geometry, Pose};
+use sutura_bevy::sutura::{ContactView, Geometry, Pose, World as Engine};
 use sutura_bevy::{Grip, Hand, Solid, Space, Strand, Sutura};
+use sutura_scene::{Contact, Frame};
 
 const STICKS: Color = Color::srgb(0.25, 0.95, 0.45);
 const SLIPS: Color = Color::srgb(1.0, 0.55, 0.1);
@@ -57,33 +58,36 @@ pub fn draw(
             outline(&mut gizmos, &space, &solid.geometry, solid.pose, size);
         }
     }
-    // What follows is of the present.
-    if stage.past.is_some() {
-        return;
-    }
+    let past = stage.shown();
     if viewer.contacts {
-        let world = sutura.world();
-        let greatest = world.contacts().map(|c| c.force.length()).fold(1e-6, f64::max);
-        for c in world.contacts() {
-            let radius = world.view().rods().find(|r| r.slot() == c.a.0).map_or(size, |r| r.radius());
-            let at = c.point - c.normal * radius;
+        let touches = past.map_or_else(|| touches_now(sutura.world()), |frame| touches_then(&stage, frame));
+        let greatest = touches.iter().map(|t| t.force.length()).fold(1e-6, f64::max);
+        for t in touches {
             // The normal is as long as a few radii; forces are to each other as their lengths.
-            let reach = 12.0 * radius;
-            gizmos.line(space.place(at), space.place(at + c.normal * 4.0 * radius), NORMAL);
-            let color = if c.sliding { SLIPS } else { STICKS };
-            let friction = c.force - c.normal * c.force.dot(c.normal);
-            gizmos.line(space.place(at), space.place(at + friction * (reach / greatest)), color);
-            gizmos.sphere(Isometry3d::from_translation(space.place(at)), radius as f32 * space.scale * 0.35, color);
+            let reach = 12.0 * t.radius;
+            gizmos.line(space.place(t.at), space.place(t.at + t.normal * 4.0 * t.radius), NORMAL);
+            let color = if t.sliding { SLIPS } else { STICKS };
+            let friction = t.force - t.normal * t.force.dot(t.normal);
+            gizmos.line(space.place(t.at), space.place(t.at + friction * (reach / greatest)), color);
+            gizmos.sphere(Isometry3d::from_translation(space.place(t.at)), t.radius as f32 * space.scale * 0.35, color);
         }
     }
-    // Grips of the scene, of the keyboard, of the mouse.
-    let scenes = sutura.simulation::<Play>().into_iter().flat_map(|p| p.0.grips().filter_map(|(_, h)| h)).filter_map(|h| {
-        let world = sutura.world();
-        Some((world.grip_pose(h).ok()?.position, world.grip_wrench(h).ok()?.force))
-    });
-    let hands = grips.iter().filter_map(|g| Some((sutura.world().grip_pose(g.handle()?).ok()?.position, g.wrench().force)));
-    let body = matches!(hand.held, Some(sutura_bevy::Held::Body(_))).then_some((hand.at, hand.force));
-    for (at, force) in scenes.chain(hands).chain(body) {
+    let holds: Vec<(DVec3, DVec3)> = match past {
+        Some(frame) => {
+            let forces = frame.forces.iter().flat_map(|f| &f.grips).map(|f| place(*f)).chain(std::iter::repeat(DVec3::ZERO));
+            frame.grips.iter().zip(forces).filter_map(|(at, force)| Some((place((*at)?), force))).collect()
+        }
+        None => {
+            // Grips of the scene, of the keyboard, of the mouse.
+            let world = sutura.world();
+            let scenes = sutura.simulation::<Play>().into_iter().flat_map(|p| p.0.grips().filter_map(|(_, h)| h));
+            let scenes = scenes.filter_map(|h| Some((world.grip_pose(h).ok()?.position, world.grip_wrench(h).ok()?.force)));
+            let hands = grips.iter().filter_map(|g| Some((world.grip_pose(g.handle()?).ok()?.position, g.wrench().force)));
+            let body = matches!(hand.held, Some(sutura_bevy::Held::Body(_))).then_some((hand.at, hand.force));
+            scenes.chain(hands).chain(body).collect()
+        }
+    };
+    for (at, force) in holds {
         gizmos.sphere(Isometry3d::from_translation(space.place(at)), 2.2 * size as f32 * space.scale, GRIP);
         // A centimeter a newton.
         let tip = at + force * 0.01;
@@ -91,6 +95,37 @@ pub fn draw(
             gizmos.arrow(space.place(at), space.place(tip), FORCE);
         }
     }
+}
+
+/// A contact to be drawn.
+struct Touch {
+    /// On the surface of the thread \[m\].
+    at: DVec3,
+    /// Toward the thread.
+    normal: DVec3,
+    /// On the thread \[N\].
+    force: DVec3,
+    sliding: bool,
+    /// Of the thread \[m\].
+    radius: f64,
+}
+
+/// Those of the present.
+fn touches_now(world: &Engine) -> Vec<Touch> {
+    let touch = |c: ContactView| {
+        let radius = world.view().rods().find(|r| r.slot() == c.a.0)?.radius();
+        Some(Touch { at: c.point - c.normal * radius, normal: c.normal, force: c.force, sliding: c.sliding, radius })
+    };
+    world.contacts().filter_map(touch).collect()
+}
+
+/// Those of a frame that is remembered, or was recorded with its forces.
+fn touches_then(stage: &Stage, frame: &Frame) -> Vec<Touch> {
+    let touch = |c: &Contact| {
+        let (radius, normal) = (stage.header.threads.get(c.on.thread as usize)?.radius, place(c.normal));
+        Some(Touch { at: place(c.point) - normal * radius, normal, force: place(c.force), sliding: c.sliding, radius })
+    };
+    frame.forces.iter().flat_map(|f| &f.contacts).filter_map(touch).collect()
 }
 
 /// A capsule by two circles and four lines.

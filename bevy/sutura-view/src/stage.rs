@@ -200,7 +200,8 @@ fn raised(from: DVec3, up: DVec3) -> DVec3 {
     if from.dot(up) >= LEAST_RISE || level.length() < 1e-6 { from } else { level.normalize() * (1.0 - LEAST_RISE * LEAST_RISE).sqrt() + up * LEAST_RISE }
 }
 
-fn place(p: [f32; 3]) -> DVec3 {
+/// A recorded place or vector.
+pub(crate) fn place(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
@@ -227,7 +228,9 @@ pub fn show_past(stage: Res<Stage>, mut strands: Query<(&Prop, &mut Strand)>, mu
         }
         strand.positions = x.iter().map(|p| place(*p)).collect();
         strand.orientations = q.iter().map(|q| DQuat::from_array(q.map(f64::from)).normalize()).collect();
+        let tensions = frame.forces.as_ref().and_then(|f| f.tensions.get(prop.0));
         strand.tensions.clear();
+        strand.tensions.extend(tensions.into_iter().flatten().map(|t| f64::from(*t)));
     }
     for (prop, mut solid) in &mut solids {
         if let Some((x, q)) = frame.shapes.get(prop.0) {

@@ -11,7 +11,7 @@ use sutura_bevy::sutura::input::{Input, Recording};
 use sutura_bevy::sutura::{Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Solver, Stretch, World as Engine};
 use sutura_bevy::{Grip, Hand, Held, Live, PhysicsClock, Pointer, Space, Sutura};
 use sutura_view::ViewerPlugin;
-use sutura_view::control::{Viewer, open};
+use sutura_view::control::{Viewer, go_to, open};
 use sutura_view::keys::{DRIVE, KEYS};
 use sutura_view::parameters::{Change, Parameters};
 use sutura_view::source::Play;
@@ -76,6 +76,30 @@ fn every_key_in_any_state_does_no_harm() {
         app.update();
     }
     assert!(!app.should_exit().is_some_and(|e| e.is_error()));
+}
+
+#[test]
+fn a_recording_and_the_past_show_the_tensions_that_there_were() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut app = app("catenary", folder.path());
+    let tensions = |app: &mut App| -> Vec<f64> { app.world_mut().query::<&sutura_bevy::Strand>().iter(app.world()).next().unwrap().tensions.clone() };
+    while app.world().resource::<Stage>().frames.len() < 40 {
+        app.update();
+    }
+    let then = app.world().resource::<Stage>().frames[20].clone();
+    let forces = then.forces.clone().unwrap();
+    let recorded: Vec<f64> = forces.tensions[0].iter().map(|t| f64::from(*t)).collect();
+    assert!(recorded.iter().any(|t| *t > 1e-5) && forces.grips.iter().any(|f| f[2] > 1e-5), "{forces:?}");
+    go_to(app.world_mut(), then.time);
+    app.update();
+    assert_eq!(tensions(&mut app), recorded);
+    let recording = folder.path().join("trajectory.sutura");
+    app.world().resource::<Stage>().trajectory().write_to(&recording).unwrap();
+    open(app.world_mut(), recording.to_str().unwrap());
+    go_to(app.world_mut(), then.time);
+    app.update();
+    assert_eq!(app.world().resource::<Stage>().shown().unwrap().time, then.time);
+    assert_eq!(tensions(&mut app), recorded);
 }
 
 #[test]

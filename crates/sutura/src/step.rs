@@ -167,11 +167,19 @@ fn give_way(model: &mut Model, tried: &State, from: &State, little: bool) -> boo
         let Some(rod) = model.rods.at(slot).filter(|r| model.inextensible[r.first as usize]) else { continue };
         let elongation = most_elongated(model, rod, tried);
         if elongation.abs() > if little { newton::LENGTH_FLOOR } else { newton::LENGTH_TOLERANCE } {
-            model.give_way(slot, from, elongation < 0.0);
+            // A trial from a length that is off may end anywhere.
+            let off = [from, tried].map(|s| longer_by(model, rod, s)).into_iter().find(|off| off.abs() > newton::LENGTH_TOLERANCE);
+            model.give_way(slot, from, off.is_some_and(|off| off < 0.0));
             any = true;
         }
     }
     any
+}
+
+/// Elongation of a rod as a whole.
+fn longer_by(model: &Model, rod: &RodModel, state: &State) -> f64 {
+    let (now, rest) = rod.elements().fold((0.0, 0.0), |(a, b), e| (a + (state.position[e + 1] - state.position[e]).length(), b + model.rest_length[e]));
+    now / rest - 1.0
 }
 
 /// Elongation of the element that is off its length most.

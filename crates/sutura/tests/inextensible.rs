@@ -14,7 +14,7 @@ use sutura::{
 const DT: f64 = 1.0 / 60.0;
 
 /// Newton iterations that a frame of four substeps may take: each length that cannot be kept costs an attempt of a few.
-const MOST_ITERATIONS: u32 = 400;
+const MOST_ITERATIONS: u32 = 1000;
 
 const INTEGRATORS: [Integrator; 2] = [Integrator::ImplicitEuler, Integrator::TrBdf2];
 

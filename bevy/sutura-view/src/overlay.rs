@@ -2,7 +2,7 @@
 
 use crate::control::Viewer;
 use crate::source::Play;
-use crate::stage::{Prop, Stage, Table};
+use crate::stage::{Prop, Stage};
 use bevy::prelude::*;
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::{Geometry, Pose};
@@ -13,13 +13,13 @@ const SLIPS: Color = Color::srgb(1.0, 0.55, 0.1);
 const NORMAL: Color = Color::srgb(0.85, 0.9, 1.0);
 const PRIMITIVE: Color = Color::srgba(1.0, 0.95, 0.55, 0.8);
 const GRIP: Color = Color::srgb(1.0, 0.85, 0.2);
-const FORCE: Color = Color::srgb(1.0, 0.25, 0.2);
+const FORCE: Color = Color::srgb(1.0, 0.36, 0.12);
 
 /// Lines lie over what they belong to.
 pub fn set_up(mut store: ResMut<GizmoConfigStore>) {
     let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
     config.depth_bias = -0.02;
-    config.line.width = 1.6;
+    config.line.width = 2.0;
 }
 
 /// Draws them.
@@ -31,7 +31,7 @@ pub fn draw(
     sutura: Res<Sutura>,
     hand: Res<Hand>,
     strands: Query<&Strand, With<Prop>>,
-    solids: Query<&Solid, Without<Table>>,
+    solids: Query<&Solid>,
     grips: Query<&Grip>,
 ) {
     let size = strands.iter().map(|s| s.skin.radius).fold(0.0, f64::max).max(1e-5);
@@ -84,7 +84,9 @@ pub fn draw(
     let hands = grips.iter().filter_map(|g| Some((sutura.world().grip_pose(g.handle()?).ok()?.position, g.wrench().force)));
     let body = matches!(hand.held, Some(sutura_bevy::Held::Body(_))).then_some((hand.at, hand.force));
     for (at, force) in scenes.chain(hands).chain(body) {
-        gizmos.sphere(Isometry3d::from_translation(space.place(at)), 2.2 * size as f32 * space.scale, GRIP);
+        if !viewer.instruments {
+            gizmos.sphere(Isometry3d::from_translation(space.place(at)), 2.2 * size as f32 * space.scale, GRIP);
+        }
         // A centimeter a newton.
         let tip = at + force * 0.01;
         if force.length() > 0.01 {

@@ -73,7 +73,7 @@ impl Materials {
             reflectance: 0.18,
             ..default()
         });
-        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.78, 0.80, 0.83), metallic: 1.0, perceptual_roughness: 0.3, ..default() });
+        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.86, 0.87, 0.89), metallic: 1.0, perceptual_roughness: 0.26, ..default() });
         let polished = StandardMaterial { base_color: Color::srgb(0.72, 0.74, 0.77), metallic: 1.0, perceptual_roughness: 0.24, ..default() };
         let fading = materials.add(StandardMaterial { alpha_mode: AlphaMode::Blend, ..polished.clone() });
         Materials { steel, instrument: materials.add(polished), fading, drape }
@@ -168,9 +168,10 @@ pub fn surroundings() -> (Image, Image) {
         Screen(Vec3::new(1.0, 0.30, 0.15), 0.09, 0.85, 3.4),
         Screen(Vec3::new(0.15, 0.42, -1.0), 0.95, 0.16, 2.8),
         Screen(Vec3::new(0.55, 0.75, 1.0), 0.30, 0.16, 0.9),
+        Screen(Vec3::new(-0.55, 0.30, 1.0), 0.30, 0.60, 1.3),
     ];
     let light = |d: Vec3, blur: f32| {
-        let wall = 0.26 + 0.30 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
+        let wall = 0.20 + 0.26 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
         let table = Vec3::new(0.075, 0.20, 0.182) * smooth(0.05 + blur, -0.25 - blur, d.y);
         let mut sum = Vec3::new(0.90, 0.98, 1.0) * wall * smooth(-0.30 - blur, 0.10 + blur, d.y) + table;
         for Screen(to, width, height, bright) in &screens {

@@ -110,10 +110,10 @@ fn capsule(gizmos: &mut Gizmos, space: &Space, a: DVec3, b: DVec3, side: DVec3, 
 
 fn ring(gizmos: &mut Gizmos, space: &Space, center: DVec3, u: DVec3, v: DVec3) {
     let at = |k: u32| {
-        let (sin, cos) = (f64::from(k) / 24.0 * core::f64::consts::TAU).sin_cos();
+        let (sin, cos) = (f64::from(k) / 40.0 * core::f64::consts::TAU).sin_cos();
         space.place(center + u * cos + v * sin)
     };
-    gizmos.linestrip((0..=24).map(at), PRIMITIVE);
+    gizmos.linestrip((0..=40).map(at), PRIMITIVE);
 }
 
 /// The edges of a shape.

@@ -172,7 +172,9 @@ pub fn surroundings() -> (Image, Image) {
     ];
     let light = |d: Vec3, blur: f32| {
         let wall = 0.20 + 0.26 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
-        let table = Vec3::new(0.075, 0.20, 0.182) * smooth(0.05 + blur, -0.25 - blur, d.y);
+        // The table is bright under the lamp and dark on the other side, which gives metal above it its roundness.
+        let lit = 0.25 + 2.2 * smooth(0.75 + blur, -0.85 - blur, d.x - 0.4 * d.z);
+        let table = Vec3::new(0.075, 0.175, 0.160) * (lit * smooth(0.05 + blur, -0.25 - blur, d.y));
         let mut sum = Vec3::new(0.90, 0.98, 1.0) * wall * smooth(-0.30 - blur, 0.10 + blur, d.y) + table;
         for Screen(to, width, height, bright) in &screens {
             let n = to.normalize();

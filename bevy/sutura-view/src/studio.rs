@@ -187,7 +187,8 @@ impl Studio {
         world.query::<&mut Camera>().iter_mut(world).for_each(|mut c| c.is_active = draws);
     }
 
-    /// The particles of each thread as pixels of the picture, and whether a body hides them; those outside of the picture are left out.
+    /// The particles of each thread as pixels of the picture, and whether a body or an instrument hides them; those farther outside of the picture than a
+    /// tenth of its height are left out.
     pub fn threads(&mut self) -> Vec<Vec<(f32, f32, bool)>> {
         let world = self.app.world_mut();
         let (orbit, space) = (world.resource::<Orbit>().clone(), *world.resource::<Space>());
@@ -217,7 +218,8 @@ impl Studio {
                     let at = clip.project_point3(space.place(*p));
                     (0.5 * (at.x + 1.0) * w, 0.5 * (1.0 - at.y) * h, hidden(*p, strand.skin.radius))
                 });
-                pixels.filter(|(x, y, _)| *x >= 0.0 && *y >= 0.0 && *x < w && *y < h).collect()
+                let edge = 0.1 * h;
+                pixels.filter(|(x, y, _)| *x >= -edge && *y >= -edge && *x < w + edge && *y < h + edge).collect()
             })
             .collect()
     }

@@ -111,7 +111,7 @@ fn turned(out: &mut Triangles, axis: DVec3, through: DVec3, profile: &[(f64, f64
     let v = axis.cross(u);
     let at = |i: usize, k: usize| {
         let (sin, cos) = (TAU * k as f64 / SIDES as f64 + FRAC_PI_2).sin_cos();
-        through + axis * profile[i].0 + (u * cos - v * sin) * profile[i].1
+        through + axis * profile[i].0 + (u * cos + v * sin) * profile[i].1
     };
     surface(out, profile.len(), SIDES, at);
 }
@@ -174,7 +174,8 @@ mod tests {
         let tip = Tip { bore: 0.3e-3, band: Srgba::WHITE };
         let solid = tip.triangles();
         let volume: f64 = solid.indices.iter().map(|t| t.map(|i| solid.positions[i as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
-        // A jaw is about a half cone with a radius from 0.5 to 1 mm; the shaft has 1 mm.
+        // It is open where the band begins; a disk there closes it. A jaw is about a half cone with a radius from 0.5 to 1 mm; the shaft has 1 mm.
+        let volume = volume + BAND * PI * SHAFT * SHAFT / 3.0;
         assert!(volume > 2e-8 && volume < 6e-8, "{volume}");
         let wrong = solid.indices.iter().filter(|t| {
             let [a, b, c] = t.map(|i| solid.positions[i as usize]);

@@ -1,12 +1,13 @@
 //! Pictures of threads and bodies: meshes, skins, materials.
 
 use crate::clock::{PhysicsClock, PhysicsLoop, advance};
+use crate::cloth::Cloth;
 use crate::look::{self, BodyLook, DRAPE_TILE, Materials};
 use crate::mesh::Triangles;
 use crate::space::Space;
 use crate::things::{Body, Thread};
-use crate::tube;
 use crate::world::Sutura;
+use crate::{tip, tube};
 use bevy::app::RunFixedMainLoop;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
@@ -19,8 +20,6 @@ use sutura::{Geometry, Pose};
 
 /// Bones of one mesh: Bevy's limit, which is that of a uniform buffer.
 const MOST_BONES: usize = 256;
-/// Half the side of the square that is drawn for a plane \[m\].
-const PLANE: f64 = 3.0;
 
 /// A thread as it is drawn. [`Thread`]s have theirs from the world; one without a `Thread` (of a recording) is drawn as it is set.
 #[derive(Component, Debug, Clone, PartialEq)]
@@ -99,7 +98,7 @@ pub(crate) fn build(app: &mut App) {
     app.add_systems(Startup, make_materials.run_if(renders));
     app.add_systems(
         PostUpdate,
-        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids).chain().before(TransformSystems::Propagate).run_if(renders),
+        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids, tip::mesh_tips).chain().before(TransformSystems::Propagate).run_if(renders),
     );
 }
 
@@ -316,17 +315,19 @@ fn mesh_solids(
         let plane = matches!(solid.geometry, Geometry::Plane);
         // What lies is a table with a cloth on it.
         let look = if plane && solid.look == BodyLook::Steel { BodyLook::Drape } else { solid.look };
-        let (material, tile) = match look {
-            BodyLook::Steel => (&shared.steel, DRAPE_TILE),
-            BodyLook::Drape => (&shared.drape, DRAPE_TILE),
+        let material = match look {
+            BodyLook::Steel => &shared.steel,
+            BodyLook::Drape => &shared.drape,
             BodyLook::Hidden => continue,
         };
-        commands.entity(entity).insert((Mesh3d(meshes.add(mesh(&Triangles::of(&solid.geometry, PLANE), space.scale, tile))), MeshMaterial3d(material.clone())));
+        // What threads lie on is as flat as it is to them.
+        let mesh = if plane { Cloth::default().mesh(space.scale) } else { mesh(&Triangles::of(&solid.geometry, 0.0), space.scale, DRAPE_TILE) };
+        commands.entity(entity).insert((Mesh3d(meshes.add(mesh)), MeshMaterial3d(material.clone())));
     }
 }
 
 /// A mesh of Bevy, in its units.
-fn mesh(t: &Triangles, scale: f32, tile: f32) -> Mesh {
+pub(crate) fn mesh(t: &Triangles, scale: f32, tile: f32) -> Mesh {
     let v = |p: &DVec3| [p.x as f32, p.y as f32, p.z as f32];
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
         .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, t.positions.iter().map(|p| v(p).map(|x| x * scale)).collect::<Vec<_>>())

@@ -31,22 +31,26 @@
 //! Without Bevy's renderer (`MinimalPlugins`) the plugin does the physics and draws nothing.
 
 mod clock;
+mod cloth;
 mod draw;
 mod hand;
 pub mod look;
 mod mesh;
 mod space;
 mod things;
+mod tip;
 mod tube;
 mod world;
 
 pub use clock::{PhysicsClock, PhysicsFrame, PhysicsLoop, PhysicsSet};
+pub use cloth::Cloth;
 pub use draw::{Drawn, Live, Solid, Strand, heat};
 pub use hand::{Hand, Held, Pointer, PointerCamera};
 pub use mesh::Triangles;
 pub use space::Space;
 pub use sutura;
 pub use things::{Body, Grip, Limits, Thread};
+pub use tip::Tip;
 pub use world::{Part, Simulation, Sutura};
 
 use bevy::app::RunFixedMainLoop;

@@ -1,5 +1,6 @@
 //! How things look: materials and textures, all of them computed.
 
+use crate::cloth::{uneven, wave};
 use bevy::asset::RenderAssetUsages;
 use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::prelude::*;
@@ -26,8 +27,8 @@ impl Default for ThreadLook {
 impl ThreadLook {
     /// One of the looks for the threads of a scene, by their number.
     pub fn of(number: usize) -> Self {
-        // Violet and blue are the colors of dyed suture; the rest tells further threads apart.
-        let colors = [("#6a3fc4", "#f2e6c9"), ("#1f5fd0", "#f4f0e6"), ("#c8472f", "#f6e3c0"), ("#d9c58a", "#3d3424"), ("#b8377f", "#f2e6c9")];
+        // Dyed violet, undyed and blue are the colors of suture; the rest tells further threads apart.
+        let colors = [("#7b45e0", "#f4ecff"), ("#dccb9c", "#7c4a1c"), ("#2263dc", "#e8f1ff"), ("#e0553a", "#fff0dc"), ("#c43f9a", "#fff0f6")];
         let (color, tracer) = colors[number % colors.len()];
         let hex = |s: &str| Srgba::hex(s).unwrap_or(Srgba::WHITE);
         ThreadLook { color: hex(color), tracer: hex(tracer), braided: true }
@@ -47,13 +48,17 @@ pub enum BodyLook {
 }
 
 /// Side of a tile of drape \[m\].
-pub const DRAPE_TILE: f32 = 0.12;
+pub const DRAPE_TILE: f32 = 0.048;
 
 /// The materials of bodies, made once.
 #[derive(Resource, Debug, Clone)]
 pub struct Materials {
-    /// Steel.
+    /// Brushed steel.
     pub steel: Handle<StandardMaterial>,
+    /// Steel of instruments, darker and smoother.
+    pub instrument: Handle<StandardMaterial>,
+    /// The same, for meshes whose colors say where it fades away.
+    pub fading: Handle<StandardMaterial>,
     /// Drape; a tile of its texture has sides of [`DRAPE_TILE`].
     pub drape: Handle<StandardMaterial>,
 }
@@ -64,12 +69,14 @@ impl Materials {
         let drape = materials.add(StandardMaterial {
             base_color_texture: Some(images.add(color)),
             normal_map_texture: Some(images.add(normal)),
-            perceptual_roughness: 0.95,
-            reflectance: 0.25,
+            perceptual_roughness: 0.92,
+            reflectance: 0.18,
             ..default()
         });
-        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.80, 0.81, 0.83), metallic: 1.0, perceptual_roughness: 0.22, ..default() });
-        Materials { steel, drape }
+        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.86, 0.87, 0.89), metallic: 1.0, perceptual_roughness: 0.26, ..default() });
+        let polished = StandardMaterial { base_color: Color::srgb(0.72, 0.74, 0.77), metallic: 1.0, perceptual_roughness: 0.24, ..default() };
+        let fading = materials.add(StandardMaterial { alpha_mode: AlphaMode::Blend, ..polished.clone() });
+        Materials { steel, instrument: materials.add(polished), fading, drape }
     }
 }
 
@@ -79,8 +86,8 @@ pub(crate) fn thread(look: &ThreadLook, images: &mut Assets<Image>) -> StandardM
     StandardMaterial {
         base_color_texture: Some(images.add(color)),
         normal_map_texture: Some(images.add(normal)),
-        perceptual_roughness: if look.braided { 0.5 } else { 0.3 },
-        reflectance: 0.5,
+        perceptual_roughness: if look.braided { 0.42 } else { 0.26 },
+        reflectance: 0.55,
         ..default()
     }
 }
@@ -94,7 +101,7 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
     let (base, tracer) = (look.color, look.tracer);
     if !look.braided {
         let color = picture(SIZE, |u, _| {
-            let t = smooth(0.09, 0.07, (u - 0.5).abs());
+            let t = smooth(0.06, 0.045, (u - 0.5).abs());
             mix(base, tracer, t)
         });
         return (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.0, |_, _| 0.0), TextureFormat::Rgba8Unorm));
@@ -120,58 +127,81 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
     (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.035, height), TextureFormat::Rgba8Unorm))
 }
 
-/// Color and normals of a tile of drape: a weave, with soft folds.
+/// Color and normals of a tile of drape: a twill of yarns none of which is quite like the next.
 fn drape() -> (Image, Image) {
     const SIZE: usize = 1024;
-    const YARNS: f32 = 256.0;
-    let folds = |u: f32, v: f32| {
-        let wave = |a: f32, b: f32, shift: f32| (TAU * (a * u + b * v) + shift + 0.9 * (TAU * (b * u - a * v)).sin()).sin();
-        0.45 * wave(1.0, 2.0, 0.3) + 0.3 * wave(3.0, -1.0, 1.1) + 0.16 * wave(2.0, 5.0, 2.7) + 0.09 * wave(7.0, 3.0, 0.9)
-    };
+    const YARNS: f32 = 160.0;
+    // Height of the cloth, the yarn on top, whether that runs along u, and where along it.
     let weave = |u: f32, v: f32| {
-        let (x, y) = (u * YARNS, v * YARNS);
-        // Twill: the crossing moves on by one from row to row.
+        // Yarns wander a little from their straight lines.
+        let (x, y) = (u * YARNS + 0.35 * wave(v, 1), v * YARNS + 0.35 * wave(u, 2));
         let over = (x.floor() + y.floor()).rem_euclid(4.0) < 2.0;
-        let (across, along) = if over { (y.rem_euclid(1.0), x.rem_euclid(1.0)) } else { (x.rem_euclid(1.0), y.rem_euclid(1.0)) };
-        (PI * across).sin() * (0.7 + 0.3 * (PI * along).sin())
+        let (across, along, yarn) = if over { (y, x, y.floor()) } else { (x, y, x.floor()) };
+        let (across, along) = (across.rem_euclid(1.0), 0.5 * along.rem_euclid(2.0));
+        let height = (PI * across).sin().max(0.0).powf(0.7) * (0.72 + 0.28 * (PI * along).sin());
+        (height, yarn, over)
     };
-    let height = |u: f32, v: f32| 0.007 * folds(u, v) + 0.0003 * weave(u, v);
-    let base = Srgba::rgb(0.13, 0.36, 0.32);
+    let base = Srgba::rgb(0.085, 0.335, 0.305);
     let color = picture(SIZE, |u, v| {
-        let mottle = 1.0 + 0.05 * folds(v, u);
-        scaled(base, mottle * (0.87 + 0.13 * weave(u, v)))
+        let (height, yarn, over) = weave(u, v);
+        let own = uneven(yarn, YARNS, if over { 1 } else { 2 });
+        // Thick and thin places along a yarn.
+        let slub = wave(if over { u } else { v } + own, 7 + (own * 5.0) as u32);
+        let shade = (0.60 + 0.44 * height) * (0.91 + 0.15 * own + 0.05 * slub);
+        let c = scaled(base, shade);
+        // Worn fibers are paler.
+        mix(c, Srgba::rgb(0.42, 0.62, 0.58), 0.10 * height * own * own)
     });
-    (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 1.0, height), TextureFormat::Rgba8Unorm))
+    (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.0007, |u, v| weave(u, v).0), TextureFormat::Rgba8Unorm))
 }
 
-/// The light of an operating theater from all around: lamps above, dim walls. Diffuse and specular cube maps.
+/// A lamp with a screen before it: direction to its middle, half its width and height (at distance 1), brightness.
+struct Screen(Vec3, f32, f32, f32);
+
+/// The light of an operating theater from all around: lamps above and by the walls in a dim room, a green table below. Diffuse and specular cube maps.
 pub fn surroundings() -> (Image, Image) {
-    // Lamps: direction, cosine of their half angle, brightness and warmth.
-    let lamps = [
-        (Vec3::new(0.3, 1.0, 0.35), 0.90, 1.0),
-        (Vec3::new(-0.9, 0.55, 0.2), 0.93, 0.75),
-        (Vec3::new(0.75, 0.35, -0.7), 0.95, 0.6),
-        (Vec3::new(-0.1, 0.5, 1.0), 0.965, 0.5),
+    let screens = [
+        // Over the table; by the walls, upright; behind it, low and wide.
+        Screen(Vec3::new(-0.45, 1.0, 0.05), 0.36, 0.36, 4.0),
+        Screen(Vec3::new(0.6, 0.75, -0.4), 0.24, 0.24, 3.5),
+        Screen(Vec3::new(-1.0, 0.28, 0.35), 0.22, 0.75, 2.6),
+        Screen(Vec3::new(1.0, 0.30, 0.15), 0.09, 0.85, 3.4),
+        Screen(Vec3::new(0.15, 0.42, -1.0), 0.95, 0.16, 2.8),
+        Screen(Vec3::new(0.55, 0.75, 1.0), 0.30, 0.16, 0.9),
+        Screen(Vec3::new(-0.55, 0.30, 1.0), 0.30, 0.60, 1.3),
     ];
     let light = |d: Vec3, blur: f32| {
-        let sky = 0.20 + 0.22 * smooth(-0.2 - blur, 1.0, d.y);
-        let ground = Vec3::new(0.10, 0.17, 0.155) * smooth(0.15 + blur, -0.35 - blur, d.y);
-        let mut sum = Vec3::new(0.93, 0.98, 1.0) * sky * smooth(-0.45 - blur, 0.1 + blur, d.y) + ground;
-        for (to, edge, bright) in lamps {
-            let c = d.dot(to.normalize());
-            // A blurred lamp is wider and fainter.
-            let (inner, outer) = (edge + 0.02, edge - 0.03 - 1.2 * blur);
-            sum += Vec3::new(1.0, 0.97, 0.92) * bright * smooth(outer, inner, c) / (1.0 + 9.0 * blur);
-        }
-        // Long lamps by the walls, which metal shows as streaks.
-        for (x, z) in [(0.8, 0.6), (-0.95, 0.3), (0.2, -0.98)] {
-            let side = Vec2::new(d.x, d.z).try_normalize().map_or(0.0, |s| s.dot(Vec2::new(x, z)));
-            let level = smooth(-0.95 - blur, -0.5, d.y) * smooth(0.95 + blur, 0.6, d.y);
-            sum += Vec3::new(0.95, 0.98, 1.0) * (0.6 * level * smooth(0.88 - 0.9 * blur, 0.97, side) / (1.0 + 5.0 * blur));
+        let wall = 0.20 + 0.26 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
+        // The table is bright under the lamp and dark on the other side, which gives metal above it its roundness.
+        let lit = 0.25 + 2.2 * smooth(0.75 + blur, -0.85 - blur, d.x - 0.4 * d.z);
+        let table = Vec3::new(0.075, 0.175, 0.160) * (lit * smooth(0.05 + blur, -0.25 - blur, d.y));
+        let mut sum = Vec3::new(0.90, 0.98, 1.0) * wall * smooth(-0.30 - blur, 0.10 + blur, d.y) + table;
+        for Screen(to, width, height, bright) in &screens {
+            let n = to.normalize();
+            let u = n.cross(if n.y.abs() > 0.9 { Vec3::X } else { Vec3::Y }).normalize();
+            let ahead = d.dot(n);
+            if ahead <= 0.05 {
+                continue;
+            }
+            // A screen that is blurred is wider and fainter.
+            let edge = 0.03 + 1.1 * blur;
+            let within = |x: f32, half: f32| smooth(half + edge, half - edge, x.abs() / ahead) * half / (half + 0.35 * edge);
+            sum += Vec3::new(1.0, 0.975, 0.94) * (*bright * within(d.dot(u), *width) * within(d.dot(u.cross(n)), *height));
         }
         sum
     };
-    (cube(8, 1, |d, _| light(d, 1.0)), cube(64, 7, |d, rough| light(d, rough * rough)))
+    // What comes from the half room above a surface, by the cosine law.
+    const AROUND: usize = 600;
+    let rays: Vec<(Vec3, Vec3)> = (0..AROUND)
+        .map(|k| {
+            let (y, turn) = (1.0 - (2 * k + 1) as f32 / AROUND as f32, 2.399_963_2 * k as f32);
+            let r = (1.0 - y * y).sqrt();
+            Vec3::new(r * turn.cos(), y, r * turn.sin())
+        })
+        .map(|d| (d, light(d, 0.1)))
+        .collect();
+    let diffuse = |d: Vec3| rays.iter().map(|(to, l)| *l * d.dot(*to).max(0.0)).sum::<Vec3>() * (4.0 / AROUND as f32);
+    (cube(8, 1, |d, _| diffuse(d)), cube(128, 8, |d, rough| light(d, rough * rough)))
 }
 
 /// A cube map with `levels` mip levels from the light of each direction at each roughness.
@@ -194,18 +224,27 @@ fn cube(size: usize, levels: usize, light: impl Fn(Vec3, f32) -> Vec3) -> Image 
                     };
                     let rough = if levels > 1 { level as f32 / (levels - 1) as f32 } else { 1.0 };
                     let c = light(d.normalize(), rough);
-                    data.extend(bytes(Srgba::from(LinearRgba::rgb(c.x, c.y, c.z))));
+                    data.extend(shared_exponent(c).to_le_bytes());
                 }
             }
         }
     }
     let extent = Extent3d { width: size as u32, height: size as u32, depth_or_array_layers: 6 };
-    let mut image = Image::new_uninit(extent, TextureDimension::D2, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::RENDER_WORLD);
+    let mut image = Image::new_uninit(extent, TextureDimension::D2, TextureFormat::Rgb9e5Ufloat, RenderAssetUsages::RENDER_WORLD);
     image.data = Some(data);
     image.texture_descriptor.mip_level_count = levels as u32;
     image.texture_view_descriptor = Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::Cube), ..default() });
     image.sampler = ImageSampler::linear();
     image
+}
+
+/// Light brighter than white in four bytes: three numbers of nine bits, and five bits for the exponent that they share.
+fn shared_exponent(c: Vec3) -> u32 {
+    let c = c.clamp(Vec3::ZERO, Vec3::splat(65000.0));
+    let exponent = (c.max_element().max(1e-9).log2().floor() as i32 + 1).clamp(-15, 16);
+    let unit = ((exponent - 9) as f32).exp2();
+    let [r, g, b] = (c / unit).to_array().map(|x| (x.round() as u32).min(511));
+    r | g << 9 | b << 18 | ((exponent + 15) as u32) << 27
 }
 
 /// Texels of a square picture, u and v in [0, 1).
@@ -250,7 +289,7 @@ fn mipped(size: usize, texels: Vec<[u8; 4]>, format: TextureFormat) -> Image {
     image.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
         address_mode_u: mode,
         address_mode_v: mode,
-        anisotropy_clamp: 8,
+        anisotropy_clamp: 4,
         ..ImageSamplerDescriptor::linear()
     });
     image

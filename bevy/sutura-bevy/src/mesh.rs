@@ -72,7 +72,7 @@ impl Triangles {
     }
 
     /// Triangles between neighboring rows of `sides` + 1 corners.
-    fn grid(&mut self, rows: usize, sides: usize) {
+    pub(crate) fn grid(&mut self, rows: usize, sides: usize) {
         for i in 0..rows.saturating_sub(1) {
             for k in 0..sides {
                 let a = (i * (sides + 1) + k) as u32;

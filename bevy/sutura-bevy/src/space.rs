@@ -33,6 +33,11 @@ impl Space {
     pub fn turn(&self, q: DQuat) -> Quat {
         self.rotation * Quat::from_xyzw(q.x as f32, q.y as f32, q.z as f32, q.w as f32)
     }
+    /// An orientation of Bevy's world in the engine.
+    pub fn turn_back(&self, q: Quat) -> DQuat {
+        let q = self.rotation.conjugate() * q;
+        DQuat::from_xyzw(f64::from(q.x), f64::from(q.y), f64::from(q.z), f64::from(q.w)).normalize()
+    }
     /// A pose.
     pub fn transform(&self, pose: Pose) -> Transform {
         Transform { translation: self.place(pose.position), rotation: self.turn(pose.orientation), scale: Vec3::ONE }

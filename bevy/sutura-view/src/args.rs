@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, value_parser = point, value_name = "X,Y,Z", allow_hyphen_values = true, requires = "headless")]
     pub look_at: Option<[f64; 3]>,
     /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.
-    #[arg(long, default_value_t = 2.5, value_name = "PIXELS")]
+    #[arg(long, default_value_t = 3.0, value_name = "PIXELS")]
     pub least_width: f32,
     /// Try the window: whether time goes on with all panels shown, files are written and opened, keys and mouse do what they should; then close it.
     #[arg(long = "try", conflicts_with = "headless")]

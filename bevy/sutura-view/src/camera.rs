@@ -1,6 +1,5 @@
 //! A camera that turns about a point.
 
-use bevy::camera::Hdr;
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::light::EnvironmentMapLight;
@@ -11,7 +10,7 @@ use sutura_bevy::{Hand, Pointer, PointerCamera, look};
 /// Height of the field of view \[rad\]: narrow, as through a loupe, so that near things are not blown up.
 pub const FIELD: f32 = 0.42;
 /// What is seen where nothing is.
-pub const BACKGROUND: Color = Color::srgb(0.11, 0.17, 0.17);
+pub const BACKGROUND: Color = Color::srgb(0.016, 0.055, 0.052);
 
 /// Where the camera is.
 #[derive(Resource, Debug, Clone, PartialEq)]
@@ -77,6 +76,18 @@ impl Orbit {
     pub fn home_direction(&self) -> Vec3 {
         self.home.2
     }
+    /// To the right in the picture where it was fitted.
+    pub fn home_right(&self) -> Vec3 {
+        self.home.3.cross(self.home.2).normalize()
+    }
+    /// The middle of the picture where it was fitted.
+    pub fn home_target(&self) -> Vec3 {
+        self.home.0
+    }
+    /// Distance from which it was fitted.
+    pub fn home_distance(&self) -> f32 {
+        self.home.1
+    }
     /// To the right in the picture.
     pub fn right(&self) -> Vec3 {
         self.up.cross(self.direction).normalize()
@@ -132,7 +143,7 @@ pub struct Surroundings(EnvironmentMapLight);
 /// Makes it.
 pub fn make_surroundings(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
     let (diffuse, specular) = look::surroundings();
-    let light = EnvironmentMapLight { diffuse_map: images.add(diffuse), specular_map: images.add(specular), intensity: 1500.0, ..default() };
+    let light = EnvironmentMapLight { diffuse_map: images.add(diffuse), specular_map: images.add(specular), intensity: 900.0, ..default() };
     commands.insert_resource(Surroundings(light));
 }
 
@@ -143,9 +154,8 @@ pub fn lens(orbit: &Orbit, around: &Surroundings) -> impl Bundle {
         Camera { clear_color: ClearColorConfig::Custom(BACKGROUND), ..default() },
         Projection::from(projection(orbit)),
         orbit.transform(),
-        // Keeps hues, and needs no table of the renderer's. Light is kept beyond white until then.
-        Tonemapping::SomewhatBoringDisplayTransform,
-        Hdr,
+        // Needs no table of the renderer's. It is done before the samples of a pixel are averaged: highlights have smooth edges then.
+        Tonemapping::AcesFitted,
         Msaa::Sample4,
         around.0.clone(),
         fog(orbit),
@@ -160,7 +170,7 @@ fn projection(orbit: &Orbit) -> PerspectiveProjection {
 
 /// The table ends in the dark.
 fn fog(orbit: &Orbit) -> DistanceFog {
-    DistanceFog { color: BACKGROUND, falloff: FogFalloff::Linear { start: 0.62 * orbit.far(), end: 1.45 * orbit.far() }, ..default() }
+    DistanceFog { color: BACKGROUND, falloff: FogFalloff::Linear { start: 0.7 * orbit.far(), end: 2.2 * orbit.far() }, ..default() }
 }
 
 /// Puts the camera where it is to be.

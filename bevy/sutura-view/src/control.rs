@@ -27,6 +27,8 @@ pub struct Viewer {
     pub contacts: bool,
     /// Collision primitives.
     pub primitives: bool,
+    /// Tips of instruments where grips hold.
+    pub instruments: bool,
     /// Which knot it is.
     pub knot: bool,
     /// Least width at which a thread is drawn \[pixels\]; 0 draws it as thin as it is.
@@ -59,8 +61,9 @@ impl Default for Viewer {
             frames: false,
             contacts: false,
             primitives: false,
+            instruments: true,
             knot: true,
-            least_width: 2.5,
+            least_width: 3.0,
             panels: true,
             help: false,
             open: None,
@@ -204,6 +207,7 @@ fn act_once(world: &mut World, action: Action) {
                 Action::Frames => &mut viewer.frames,
                 Action::Contacts => &mut viewer.contacts,
                 Action::Primitives => &mut viewer.primitives,
+                Action::Instruments => &mut viewer.instruments,
                 Action::Knot => &mut viewer.knot,
                 Action::Panels => &mut viewer.panels,
                 Action::Help => &mut viewer.help,

@@ -33,6 +33,8 @@ pub enum Action {
     Contacts,
     /// Collision primitives.
     Primitives,
+    /// Instruments.
+    Instruments,
     /// Which knot it is.
     Knot,
     /// Panels.
@@ -75,6 +77,7 @@ pub const KEYS: &[(KeyCode, &str, &str, Action)] = &[
     (KeyCode::KeyV, "V", "material frames", Action::Frames),
     (KeyCode::KeyC, "C", "contacts: normals, and friction that sticks (green) or slips (orange)", Action::Contacts),
     (KeyCode::KeyP, "P", "collision primitives", Action::Primitives),
+    (KeyCode::KeyH, "H", "instruments where grips hold", Action::Instruments),
     (KeyCode::KeyB, "B", "which knot it is", Action::Knot),
     (KeyCode::Digit1, "1", "grip A takes the start of the first thread, or lets go", Action::Take(0)),
     (KeyCode::Digit2, "2", "grip B takes the end of the last thread, or lets go", Action::Take(1)),

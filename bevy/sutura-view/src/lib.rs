@@ -3,6 +3,7 @@
 pub mod args;
 pub mod camera;
 pub mod control;
+mod instruments;
 pub mod keys;
 mod overlay;
 mod panel;
@@ -47,7 +48,10 @@ impl Plugin for ViewerPlugin {
         // Where there is a renderer.
         let renders = resource_exists::<Assets<StandardMaterial>>;
         app.add_systems(Startup, (stage::light, camera::make_surroundings).run_if(renders));
-        app.add_systems(Update, (camera::follow, stage::aim).after(camera::orbit).run_if(renders));
+        app.add_systems(
+            Update,
+            (camera::follow, stage::aim, stage::cover_table.after(stage::lay_table), instruments::show).after(camera::orbit).run_if(renders),
+        );
         let lines = resource_exists::<GizmoConfigStore>;
         app.add_systems(Startup, overlay::set_up.run_if(lines));
         app.add_systems(Update, (overlay::draw, control::record).after(stage::show_past).run_if(lines));

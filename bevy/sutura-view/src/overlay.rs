@@ -2,7 +2,7 @@
 
 use crate::control::Viewer;
 use crate::source::Play;
-use crate::stage::{Prop, Stage, Table, place};
+use crate::stage::{Prop, Stage, place};
 use bevy::prelude::*;
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::{ContactView, Geometry, Pose, World as Engine};
@@ -14,13 +14,13 @@ const SLIPS: Color = Color::srgb(1.0, 0.55, 0.1);
 const NORMAL: Color = Color::srgb(0.85, 0.9, 1.0);
 const PRIMITIVE: Color = Color::srgba(1.0, 0.95, 0.55, 0.8);
 const GRIP: Color = Color::srgb(1.0, 0.85, 0.2);
-const FORCE: Color = Color::srgb(1.0, 0.25, 0.2);
+const FORCE: Color = Color::srgb(1.0, 0.36, 0.12);
 
 /// Lines lie over what they belong to.
 pub fn set_up(mut store: ResMut<GizmoConfigStore>) {
     let (config, _) = store.config_mut::<DefaultGizmoConfigGroup>();
     config.depth_bias = -0.02;
-    config.line.width = 1.6;
+    config.line.width = 2.0;
 }
 
 /// Draws them.
@@ -32,7 +32,7 @@ pub fn draw(
     sutura: Res<Sutura>,
     hand: Res<Hand>,
     strands: Query<&Strand, With<Prop>>,
-    solids: Query<&Solid, Without<Table>>,
+    solids: Query<&Solid>,
     grips: Query<&Grip>,
 ) {
     let size = strands.iter().map(|s| s.skin.radius).fold(0.0, f64::max).max(1e-5);
@@ -88,7 +88,9 @@ pub fn draw(
         }
     };
     for (at, force) in holds {
-        gizmos.sphere(Isometry3d::from_translation(space.place(at)), 2.2 * size as f32 * space.scale, GRIP);
+        if !viewer.instruments || past.is_some() {
+            gizmos.sphere(Isometry3d::from_translation(space.place(at)), 2.2 * size as f32 * space.scale, GRIP);
+        }
         // A centimeter a newton.
         let tip = at + force * 0.01;
         if force.length() > 0.01 {
@@ -143,10 +145,10 @@ fn capsule(gizmos: &mut Gizmos, space: &Space, a: DVec3, b: DVec3, side: DVec3, 
 
 fn ring(gizmos: &mut Gizmos, space: &Space, center: DVec3, u: DVec3, v: DVec3) {
     let at = |k: u32| {
-        let (sin, cos) = (f64::from(k) / 24.0 * core::f64::consts::TAU).sin_cos();
+        let (sin, cos) = (f64::from(k) / 40.0 * core::f64::consts::TAU).sin_cos();
         space.place(center + u * cos + v * sin)
     };
-    gizmos.linestrip((0..=24).map(at), PRIMITIVE);
+    gizmos.linestrip((0..=40).map(at), PRIMITIVE);
 }
 
 /// The edges of a shape.

@@ -2,12 +2,12 @@
 
 use crate::camera::Orbit;
 use crate::source::{Play, Source, skin};
-use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap};
+use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, EnvironmentMapLight, NotShadowCaster};
 use bevy::prelude::*;
-use sutura_bevy::look::{BodyLook, ThreadLook};
-use sutura_bevy::sutura::glam::{DQuat, DVec3};
+use sutura_bevy::look::{BodyLook, Materials, ThreadLook};
+use sutura_bevy::sutura::glam::{DMat3, DQuat, DVec3};
 use sutura_bevy::sutura::{Geometry, Pose};
-use sutura_bevy::{Body, Hand, Live, PhysicsClock, Solid, Space, Strand, Sutura, Thread, Triangles};
+use sutura_bevy::{Body, Cloth, Hand, Live, PhysicsClock, Solid, Space, Strand, Sutura, Thread, Triangles};
 use sutura_scene::{Camera, Frame, Header, Runner, Trajectory};
 
 /// A thing of the scene, by its number among threads or bodies.
@@ -16,7 +16,10 @@ pub struct Prop(pub usize);
 
 /// The table under everything, where the scene has no plane of its own.
 #[derive(Component, Debug)]
-pub struct Table;
+pub struct Table {
+    /// Half the size of what is on it at first \[m\].
+    pub reach: f64,
+}
 
 /// What is on view.
 #[derive(Resource)]
@@ -192,7 +195,7 @@ fn upward(gravity: DVec3, camera: Option<&Camera>) -> DVec3 {
 }
 
 /// Least sine of the angle at which a table is looked down at: below it one would see its edge, or its underside.
-const LEAST_RISE: f64 = 0.34;
+const LEAST_RISE: f64 = 0.45;
 
 /// A direction to the eye, raised to where it sees the table.
 fn raised(from: DVec3, up: DVec3) -> DVec3 {
@@ -279,68 +282,133 @@ pub fn frame_view(world: &mut World, aspect: f32, zoom: f32) -> Orbit {
     Orbit::fitted(&points, space.direction(from), screen_up, at, width, aspect, zoom)
 }
 
-/// The table comes down to where nothing hangs through it.
+/// Distance from the lowest thing to the table \[m\], and how much more for the height of things: near enough for shadows that ground them.
+const CLEARANCE: (f64, f64) = (0.003, 0.10);
+
+/// The table comes down to where nothing hangs through it. It lies square to the picture.
 pub fn lay_table(
     mut commands: Commands,
     mut stage: ResMut<Stage>,
+    space: Res<Space>,
     strands: Query<&Strand>,
-    solids: Query<&Solid, Without<Table>>,
-    mut tables: Query<&mut Solid, With<Table>>,
+    solids: Query<&Solid>,
+    mut tables: Query<(&mut Table, &mut Transform)>,
 ) {
     if solids.iter().any(|s| matches!(s.geometry, Geometry::Plane)) {
         return;
     }
     let up = stage.up;
+    let (mut least, mut most) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut seen = |h: f64| (low, high) = (low.min(h), high.max(h));
-    strands.iter().flat_map(|s| &s.positions).for_each(|p| seen(p.dot(up)));
+    let mut seen = |p: DVec3| {
+        (least, most) = (least.min(p), most.max(p));
+        (low, high) = (low.min(p.dot(up)), high.max(p.dot(up)));
+    };
+    strands.iter().flat_map(|s| &s.positions).for_each(|p| seen(*p));
     for solid in &solids {
-        Triangles::of(&solid.geometry, 0.0).positions.iter().for_each(|p| seen(solid.pose.transform_point(*p).dot(up)));
+        Triangles::of(&solid.geometry, 0.0).positions.iter().for_each(|p| seen(solid.pose.transform_point(*p)));
     }
     if !low.is_finite() {
         return;
     }
-    let room = 0.012 + 0.15 * (high - low);
-    if stage.table.is_some_and(|t| t < low - 0.2 * room) {
-        return;
-    }
-    stage.table = Some(low - room);
-    let pose = Pose::new(up * (low - room), DQuat::from_rotation_arc(DVec3::Z, up));
+    let height = low - CLEARANCE.0 - CLEARANCE.1 * (high - low);
+    // It never comes up again, and things stay over its middle.
+    let height = stage.table.map_or(height, |t| t.min(low - 0.5 * CLEARANCE.0));
     match tables.single_mut() {
-        Ok(mut table) => table.pose = pose,
-        Err(_) => {
-            commands.spawn((Solid { geometry: Geometry::Plane, pose, look: BodyLook::Drape }, Table));
+        Ok(_) if stage.table == Some(height) => {}
+        Ok((_, mut place)) => {
+            let moved = up * (height - stage.table.unwrap_or(height));
+            place.translation += space.place(moved);
         }
+        Err(_) => {
+            let middle = 0.5 * (least + most);
+            let from = stage.camera.map_or(DVec3::NEG_Y, |c| c.from);
+            let right = stage.camera.map_or(up, |c| c.up).cross(from);
+            let right = (right - up * right.dot(up)).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
+            let turn = DQuat::from_mat3(&DMat3::from_cols(right, up.cross(right), up));
+            let pose = Pose::new(middle + up * (height - middle.dot(up)), turn);
+            let reach = (0.5 * (most - least).length()).clamp(0.02, 0.4);
+            commands.spawn((Table { reach }, space.transform(pose), Visibility::default()));
+        }
+    }
+    if stage.table != Some(height) {
+        stage.table = Some(height);
     }
 }
 
-/// The lamp, which stands by the camera's scene and not by the camera.
-#[derive(Component, Debug)]
-pub struct Lamp;
+/// Spreads a cloth on a new table.
+pub fn cover_table(
+    mut commands: Commands,
+    space: Res<Space>,
+    shared: Res<Materials>,
+    tables: Query<(Entity, &Table), Without<Mesh3d>>,
+    mut meshes: ResMut<Assets<Mesh>>,
+) {
+    for (entity, table) in &tables {
+        let cloth = Cloth { reach: table.reach, folds: 1.0, ..Cloth::default() };
+        commands.entity(entity).insert((Mesh3d(meshes.add(cloth.mesh(space.scale))), MeshMaterial3d(shared.drape.clone()), NotShadowCaster));
+    }
+}
+
+/// The lamp that casts shadows, and the one behind that draws edges; they stand by the camera's scene and not by the camera.
+#[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lamp {
+    /// From over the left shoulder.
+    Key,
+    /// From behind on the right, cool.
+    Rim,
+}
 
 /// Light and shadow.
 pub fn light(mut commands: Commands) {
     commands.insert_resource(DirectionalLightShadowMap { size: 4096 });
     commands.insert_resource(GlobalAmbientLight { brightness: 0.0, ..default() });
-    let lamp = DirectionalLight { illuminance: 7500.0, color: Color::srgb(1.0, 0.97, 0.92), shadow_maps_enabled: true, ..default() };
-    commands.spawn((lamp, Lamp));
+    // Threads are thin: their shadows begin at their surface.
+    let key = DirectionalLight {
+        illuminance: 9000.0,
+        color: Color::srgb(1.0, 0.965, 0.91),
+        shadow_maps_enabled: true,
+        shadow_depth_bias: 0.003,
+        shadow_normal_bias: 1.2,
+        ..default()
+    };
+    commands.spawn((key, Lamp::Key));
+    commands.spawn((DirectionalLight { illuminance: 3000.0, color: Color::srgb(0.80, 0.90, 1.0), ..default() }, Lamp::Rim));
 }
 
-/// The lamp shines from over the shoulder, and its shadows are as fine as the view is close.
-pub fn aim(mut commands: Commands, stage: Res<Stage>, space: Res<Space>, orbit: Res<Orbit>, mut lamps: Query<(Entity, &mut Transform), With<Lamp>>) {
+/// The lamps and the room stand by the scene as it is looked at first, and the shadows are as fine as the view is close.
+pub fn aim(
+    mut commands: Commands,
+    stage: Res<Stage>,
+    space: Res<Space>,
+    orbit: Res<Orbit>,
+    mut lamps: Query<(Entity, &Lamp, &mut Transform)>,
+    mut rooms: Query<&mut EnvironmentMapLight>,
+) {
     if !(orbit.is_changed() || stage.is_changed()) {
         return;
     }
     let up = space.direction(stage.up);
-    let right = orbit.home_direction().cross(up).try_normalize().unwrap_or(Vec3::X);
-    let toward = (up * 1.0 + right * -0.55 + orbit.home_direction() * 0.45).normalize();
-    for (lamp, mut place) in &mut lamps {
-        *place = Transform::from_translation(orbit.target + toward * orbit.distance).looking_at(orbit.target, right);
-        // Fine shadows where one looks, and coarser ones behind where that is close.
-        let (near, middle, far) = (0.3 * orbit.distance, 2.2 * orbit.distance, orbit.far());
-        let num_cascades = if far > 1.2 * middle { 2 } else { 1 };
-        let cascades = CascadeShadowConfigBuilder { num_cascades, minimum_distance: near, first_cascade_far_bound: middle, maximum_distance: far, ..default() };
-        let cascades = cascades.build();
-        commands.entity(lamp).insert(cascades);
+    let level = |v: Vec3| (v - up * v.dot(up)).try_normalize();
+    let right = level(orbit.home_right()).unwrap_or_else(|| up.any_orthonormal_vector());
+    let front = right.cross(up);
+    for mut room in &mut rooms {
+        room.rotation = Quat::from_mat3(&Mat3::from_cols(right, up, front));
+    }
+    for (lamp, kind, mut place) in &mut lamps {
+        let toward = match kind {
+            Lamp::Key => up * 0.95 - right * 0.75 + front * 0.25,
+            Lamp::Rim => up * 0.55 + right * 0.6 - front * 0.9,
+        };
+        *place = Transform::from_translation(orbit.target + toward.normalize() * orbit.distance).looking_at(orbit.target, right);
+        if *kind == Lamp::Key {
+            // Fine shadows where one looks, and coarser ones behind where that is close.
+            let (near, middle, far) = (0.3 * orbit.distance, 2.2 * orbit.distance, orbit.far());
+            let num_cascades = if far > 1.2 * middle { 2 } else { 1 };
+            let cascades =
+                CascadeShadowConfigBuilder { num_cascades, minimum_distance: near, first_cascade_far_bound: middle, maximum_distance: far, ..default() };
+            let cascades = cascades.build();
+            commands.entity(lamp).insert(cascades);
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::camera::{self, FIELD, Orbit, Surroundings};
 use crate::source::Play;
-use crate::stage::{self, Stage, Table};
+use crate::stage::{self, Stage};
 use crate::{ViewerPlugin, quiet};
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::RenderTarget;
@@ -18,7 +18,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::{Geometry, Pose};
-use sutura_bevy::{PhysicsClock, Solid, Space, Strand, Sutura, Triangles};
+use sutura_bevy::{PhysicsClock, Solid, Space, Strand, Sutura, Tip, Triangles};
 
 /// A picture, rows from the top, three bytes a pixel (sRGB).
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -100,6 +100,11 @@ impl Studio {
         app.add_systems(PostStartup, move |mut commands: Commands, orbit: Res<Orbit>, around: Res<Surroundings>| {
             commands.spawn((camera::lens(&orbit, &around), RenderTarget::from(to.clone())));
         });
+        app.add_systems(Startup, |mut store: ResMut<GizmoConfigStore>| {
+            for (_, config, _) in store.iter_mut() {
+                config.line.width *= FINER as f32;
+            }
+        });
         app.world_mut().resource_mut::<PhysicsClock>().running = false;
         app.finish();
         app.cleanup();
@@ -154,7 +159,7 @@ impl Studio {
 
     /// Draws it.
     pub fn draw(&mut self) -> Result<Picture, String> {
-        // What was changed is laid out (the table, the lamp), then drawn and read back.
+        // What was changed is laid out (the table, the lamp) and given to the renderer, then drawn and read back.
         self.app.update();
         let taken: Arc<Mutex<Option<Vec<u8>>>> = Arc::default();
         let slot = taken.clone();
@@ -165,27 +170,40 @@ impl Studio {
         });
         for _ in 0..PATIENCE {
             self.app.update();
+            // It is on its way: no more are drawn meanwhile.
+            self.activate(false);
             if let Some(data) = taken.lock().ok().and_then(|mut t| t.take()) {
+                self.activate(true);
                 return Ok(Picture::reduced(&data, self.size.0, self.size.1, FINER));
             }
         }
+        self.activate(true);
         Err("the picture did not come back from the graphics driver".into())
     }
 
-    /// The particles of each thread as pixels of the picture, and whether a body hides them; those outside of the picture are left out.
+    /// Whether the camera draws.
+    fn activate(&mut self, draws: bool) {
+        let world = self.app.world_mut();
+        world.query::<&mut Camera>().iter_mut(world).for_each(|mut c| c.is_active = draws);
+    }
+
+    /// The particles of each thread as pixels of the picture, and whether a body or an instrument hides them; those farther outside of the picture than a
+    /// tenth of its height are left out.
     pub fn threads(&mut self) -> Vec<Vec<(f32, f32, bool)>> {
         let world = self.app.world_mut();
         let (orbit, space) = (world.resource::<Orbit>().clone(), *world.resource::<Space>());
         let eye = space.place_back(orbit.transform().translation);
-        let bodies: Vec<(Triangles, Pose)> = world
-            .query_filtered::<&Solid, Without<Table>>()
-            .iter(world)
-            .filter(|s| !matches!(s.geometry, Geometry::Plane))
-            .map(|s| (Triangles::of(&s.geometry, 0.0), s.pose))
-            .collect();
+        let bodies: Vec<(Triangles, Pose)> =
+            world.query::<&Solid>().iter(world).filter(|s| !matches!(s.geometry, Geometry::Plane)).map(|s| (Triangles::of(&s.geometry, 0.0), s.pose)).collect();
         let (w, h) = (self.size.0 as f32, self.size.1 as f32);
         let view = orbit.transform().to_matrix().inverse();
         let clip = Mat4::perspective_infinite_reverse_rh(FIELD, w / h, 0.1) * view;
+        let tips: Vec<(Triangles, Pose)> = world
+            .query::<(&Tip, &Transform)>()
+            .iter(world)
+            .map(|(tip, at)| (tip.triangles(), Pose::new(space.place_back(at.translation), space.turn_back(at.rotation))))
+            .collect();
+        let bodies: Vec<(Triangles, Pose)> = bodies.into_iter().chain(tips).collect();
         let hidden = |p: DVec3, radius: f64| {
             bodies.iter().any(|(t, pose)| {
                 let (from, way) = (pose.inverse_transform_point(eye), pose.orientation.conjugate() * (p - eye));
@@ -200,7 +218,8 @@ impl Studio {
                     let at = clip.project_point3(space.place(*p));
                     (0.5 * (at.x + 1.0) * w, 0.5 * (1.0 - at.y) * h, hidden(*p, strand.skin.radius))
                 });
-                pixels.filter(|(x, y, _)| *x >= 0.0 && *y >= 0.0 && *x < w && *y < h).collect()
+                let edge = 0.1 * h;
+                pixels.filter(|(x, y, _)| *x >= -edge && *y >= -edge && *x < w + edge && *y < h + edge).collect()
             })
             .collect()
     }

@@ -37,7 +37,8 @@ fn judge(picture: &Picture, threads: &[Vec<(f32, f32, bool)>], width: f32) -> Re
     let reach = 0.75 * width + 3.0;
     let mut allowed = vec![false; (w * h) as usize];
     for thread in threads {
-        for (x, y, hidden) in thread {
+        // What leaves the picture is seen up to its edge.
+        for (x, y, hidden) in thread.iter().filter(|p| at(p.0.floor() as i32, p.1.floor() as i32).is_some()) {
             all += usize::from(!hidden);
             seen += usize::from(!hidden && near(*x, *y));
         }

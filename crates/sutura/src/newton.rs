@@ -76,7 +76,6 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let mut waiting = !exact;
     let kept_before = length_error(model, &scratch.start) < LENGTH_TOLERANCE;
     let held_apart = model.rods.iter().any(|(_, rod)| is_held_apart(rod, scratch));
-    let mut lasting = 0;
     let (mut before, mut moved_before, mut gain_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
@@ -136,8 +135,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
         // Of a thread that may not be able to keep its length, multipliers must come to an end, not only lengths.
         let watched = kept_before && (held_apart || !scratch.rows.is_empty()) && gain > SETTLED * most_multiplier(model, scratch);
-        lasting = if gain > LASTING * gain_before && gain_before > LASTING * gain { lasting + 1 } else { 0 };
-        if rests && (stretched > LENGTH_TOLERANCE && lasting >= 1 || watched && lasting >= 1) {
+        let lasts = gain > LASTING * gain_before && gain_before > LASTING * gain;
+        if rests && lasts && (stretched > LENGTH_TOLERANCE || watched) {
             out.infeasible = true;
             break;
         }

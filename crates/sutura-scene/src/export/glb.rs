@@ -153,7 +153,7 @@ impl Writer for Glb {
             scene_nodes.push(tube);
         }
         for ((mesh, (name, open)), path) in self.looks.shapes.iter().zip(&self.shapes).zip(&mut paths) {
-            let (color, metallic, roughness) = if *open { ([70, 120, 95], 0.0, 0.9) } else { ([196, 199, 205], 0.9, 0.35) };
+            let (color, metallic, roughness) = if *open { ([22, 86, 78], 0.0, 0.92) } else { ([219, 222, 227], 1.0, 0.3) };
             let material = doc.material(name, color, metallic, roughness, None, *open);
             let mesh = doc.mesh(name, mesh, material, &[]);
             let node = doc.node(name, path, Some(mesh));

@@ -117,7 +117,7 @@ impl Model {
     }
     /// Lets a rod stretch from a state on, from which its tension grows by E A times the strain; what is to be shorter has no tension to begin with.
     pub(crate) fn give_way(&mut self, slot: u32, from: &State, shorter: bool) {
-        for e in self.rods.at(slot).map_or(0..0, |r| r.elements()) {
+        for e in self.rods.at(slot).map_or(0..0, RodModel::elements) {
             self.inextensible[e] = false;
             self.refresh_element(e);
             let tension = if shorter { from.tension[e].min(0.0) } else { from.tension[e] };
@@ -126,7 +126,7 @@ impl Model {
     }
     /// Makes the length of a rod a constraint again.
     pub(crate) fn keep_length(&mut self, slot: u32) {
-        for e in self.rods.at(slot).map_or(0..0, |r| r.elements()) {
+        for e in self.rods.at(slot).map_or(0..0, RodModel::elements) {
             (self.inextensible[e], self.offset[e]) = (true, 0.0);
             self.refresh_element(e);
         }

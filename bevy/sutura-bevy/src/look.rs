@@ -167,11 +167,11 @@ pub fn surroundings() -> (Image, Image) {
         Screen(Vec3::new(-1.0, 0.28, 0.35), 0.22, 0.75, 2.6),
         Screen(Vec3::new(1.0, 0.30, 0.15), 0.09, 0.85, 3.4),
         Screen(Vec3::new(0.15, 0.42, -1.0), 0.95, 0.16, 2.8),
-        Screen(Vec3::new(0.55, 0.75, 1.0), 0.30, 0.16, 0.9),
-        Screen(Vec3::new(-0.55, 0.30, 1.0), 0.30, 0.60, 1.3),
+        Screen(Vec3::new(0.55, 0.75, 1.0), 0.42, 0.22, 2.0),
+        Screen(Vec3::new(-0.55, 0.30, 1.0), 0.30, 0.70, 2.0),
     ];
     let light = |d: Vec3, blur: f32| {
-        let wall = 0.20 + 0.26 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
+        let wall = 0.38 + 0.34 * smooth(-0.3 - blur, 0.9, d.y) * smooth(1.3, 0.5, d.y);
         // The table is bright under the lamp and dark on the other side, which gives metal above it its roundness.
         let lit = 0.25 + 2.2 * smooth(0.75 + blur, -0.85 - blur, d.x - 0.4 * d.z);
         let table = Vec3::new(0.075, 0.175, 0.160) * (lit * smooth(0.05 + blur, -0.25 - blur, d.y));

@@ -23,15 +23,17 @@ pub(crate) const LENGTH_TOLERANCE: f64 = 5e-6;
 /// Elongation that is as good as none: held any longer, multipliers grow by 100 EA times it in each substep.
 pub(crate) const LENGTH_FLOOR: f64 = 1e-11;
 
-/// Change of multipliers over that of the iteration before from which on they do not bring a length back: where a thread can follow, a hundredth is left.
-/// What is more than its inverse is of something else.
-const LASTING: f64 = 0.9;
+/// Turn of an iteration \[rad\] below which elongation of second order is not worth another one.
+const CALM: f64 = 1e-4;
 
-/// Change of multipliers over the tension there is that counts as none.
-const SETTLED: f64 = 1e-6;
+/// Turn \[rad\] of an iteration, and move in hundreds of radii, below which nothing moves at all.
+const STILL: f64 = 1e-7;
 
-/// Iterations that threads which may not be able to keep their length, and are within the tolerance, are given to show it.
+/// Iterations in which lengths within the tolerance are looked after.
 const PATIENCE: u32 = 3;
+
+/// Elongation over that of the iteration before beyond which multipliers, which leave a hundredth where a thread can follow, do not bring a length back.
+const LASTING: f64 = 0.9;
 
 /// Least part of a step that is taken: a contact met on the way must be met, or the next step does not know of it.
 const SHORTEST: f64 = 0.3;
@@ -75,8 +77,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
     let kept_before = length_error(model, &scratch.start) < LENGTH_TOLERANCE;
-    let held_apart = model.rods.iter().any(|(_, rod)| is_held_apart(rod, scratch));
-    let (mut before, mut moved_before, mut gain_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let (mut before, mut moved_before, mut stretched_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
     while out.iterations < settings.newton_max && !scratch.exhausted() {
@@ -117,7 +118,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         gained = work_ahead(model, state, scratch);
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
-        let (slid, gain) = apply(model, state, scratch, scale);
+        let slid = apply(model, state, scratch, scale);
         row::shape::predict(scratch, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
@@ -133,15 +134,17 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
         (before, moved_before) = (out.turn, out.residual);
         let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
-        // Of a thread that may not be able to keep its length, multipliers must come to an end, not only lengths.
-        let watched = kept_before && (held_apart || !scratch.rows.is_empty()) && gain > SETTLED * most_multiplier(model, scratch);
-        let lasts = gain > LASTING * gain_before && gain_before > LASTING * gain;
-        if rests && lasts && (stretched > LENGTH_TOLERANCE || watched) {
+        // A turn leaves an elongation of second order, which the next one takes away. What else is left, of a thread that had its length, must not last.
+        let watched = kept_before && out.turn < CALM && out.iterations <= PATIENCE.min(settings.newton_max);
+        let still = out.turn < STILL && out.residual < 100.0 * STILL;
+        let lasts = stretched > LASTING * stretched_before;
+        if rests && lasts && stretched > if watched && still { LENGTH_FLOOR } else { LENGTH_TOLERANCE } {
             out.infeasible = true;
             break;
         }
-        let owed = stretched > LENGTH_TOLERANCE || watched && out.iterations < PATIENCE.min(settings.newton_max);
-        gain_before = gain;
+        let watched = watched && !lasts && out.iterations < PATIENCE.min(settings.newton_max);
+        let owed = stretched > if watched { LENGTH_FLOOR.max(out.turn * out.turn) } else { LENGTH_TOLERANCE };
+        stretched_before = stretched;
         if rests
             && !owed
             && row::couple::solved(scratch)
@@ -322,9 +325,8 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
     out.abs() > TRUSTED * kept
 }
 
-/// Takes a part of the step; the largest move of a pushed shape \[m\] and the largest change of a multiplier \[N\].
-fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) -> (f64, f64) {
-    let mut gain = 0.0;
+/// Takes a part of the step; the largest move of a pushed shape \[m\].
+fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) -> f64 {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
         for e in rod.start..rod.end - 1 {
@@ -333,7 +335,6 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
             let strain = q.conjugate() * d + strain_change(state, &scratch.step, e) * scale - DVec3::new(0.0, 0.0, model.rest_length[e]);
             let f = strain * model.stretch_stiffness[e];
             scratch.tension[e] = f.z + if model.inextensible[e] { scratch.tension[e] } else { model.offset[e] };
-            gain = if model.inextensible[e] { max_or_nan(gain, f.z.abs()) } else { gain };
             scratch.shear[e] = f.truncate();
         }
         for i in rod.clone() {
@@ -348,19 +349,7 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
     }
     let rows = &scratch.rows;
     rows.welds.apply(state, rows.sliders.count(), &rows.border, scale);
-    (rows.sliders.apply(state, &rows.border, scale), gain)
-}
-
-/// Largest multiplier of a length \[N\].
-fn most_multiplier(model: &Model, scratch: &Scratch) -> f64 {
-    scratch.tension.iter().zip(&model.inextensible).map(|(t, is)| if *is { t.abs() } else { 0.0 }).fold(0.0, f64::max)
-}
-
-/// Whether an inextensible rod is held at places that are not those of one element.
-fn is_held_apart(rod: &RodModel, scratch: &Scratch) -> bool {
-    let held = |i: &usize| scratch.freedom[2 * i] == Freedom::Held;
-    let (first, last) = (rod.particles().find(held), rod.particles().rev().find(held));
-    rod.stretch == crate::Stretch::Inextensible && first.zip(last).is_some_and(|(a, b)| b > a + 1)
+    rows.sliders.apply(state, &rows.border, scale)
 }
 
 /// Whether every element whose length is a constraint keeps it.

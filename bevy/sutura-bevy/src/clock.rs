@@ -33,7 +33,8 @@ pub struct PhysicsClock {
     pub frame: f64,
     /// Frames to do although it does not run; counts down.
     pub by_hand: u32,
-    /// Most time of a drawn frame that physics may take. At least one frame is done where one is due.
+    /// Most time of a drawn frame that physics may take; where all the rest of a drawn frame takes longer, that long, so that slow pictures slow no physics. At
+    /// least one frame is done where one is due.
     pub budget: Duration,
     /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
     /// running after a debt that only grows.
@@ -52,6 +53,10 @@ pub struct PhysicsClock {
     pub ms: f64,
     /// Simulated over real time reached lately; 1 is real time.
     pub rate: f64,
+    /// Drawn frames whose time counts for nothing yet.
+    free: u32,
+    /// When physics of the last drawn frame was done.
+    done: Option<Instant>,
 }
 
 impl Default for PhysicsClock {
@@ -70,6 +75,8 @@ impl Default for PhysicsClock {
             remaining: 0,
             ms: 0.0,
             rate: 0.0,
+            free: 0,
+            done: None,
         }
     }
 }
@@ -83,13 +90,16 @@ impl PhysicsClock {
     pub fn is_late(&self) -> bool {
         self.running && self.owed > 0.5 * self.most_owed
     }
-    /// Forgets what is owed, as after a pause or where another world begins.
+    /// Forgets what is owed, as where another world begins. It is drawn as it begins: time before it counts for nothing, nor does the time of the drawn frame
+    /// that made it, which may be long.
     pub fn restart(&mut self) {
-        (self.owed, self.lost, self.rate, self.frames) = (0.0, 0.0, 0.0, 0);
+        (self.owed, self.lost, self.rate, self.frames, self.free) = (0.0, 0.0, 0.0, 0, 2);
     }
 
     /// Real time passed; how many frames are due.
     fn pass(&mut self, elapsed: f64) -> u32 {
+        let elapsed = if self.free > 0 { 0.0 } else { elapsed };
+        self.free = self.free.saturating_sub(1);
         if !self.running {
             self.owed = 0.0;
             return std::mem::take(&mut self.by_hand);
@@ -111,7 +121,8 @@ pub(crate) fn advance(world: &mut World) {
     let mut clock = world.resource_mut::<PhysicsClock>();
     let due = clock.pass(elapsed);
     clock.now = 0;
-    let (begin, budget) = (Instant::now(), clock.budget);
+    let begin = Instant::now();
+    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max(begin - done));
     for k in 0..due {
         if k > 0 && begin.elapsed() > budget {
             break;
@@ -128,6 +139,7 @@ pub(crate) fn advance(world: &mut World) {
         }
     }
     let mut clock = world.resource_mut::<PhysicsClock>();
+    clock.done = Some(Instant::now());
     if elapsed > 0.0 {
         // A mean over about a second.
         let weight = (elapsed / (elapsed + 1.0)).clamp(0.0, 1.0);
@@ -146,6 +158,16 @@ mod tests {
         assert!((clock.lost - 1.5).abs() < 1e-12 && clock.is_late());
         let mut paused = PhysicsClock { running: false, by_hand: 2, ..PhysicsClock::default() };
         assert_eq!((paused.pass(1.0), paused.pass(1.0)), (2, 0));
+    }
+
+    #[test]
+    fn another_world_begins_at_its_beginning() {
+        let mut clock = PhysicsClock::default();
+        assert_eq!(clock.pass(0.5), 30);
+        clock.restart();
+        // The frame in which it is made, and the one that shows how long that took.
+        assert_eq!((clock.pass(0.1), clock.pass(5.0), clock.pass(0.1)), (0, 0, 6));
+        assert!(clock.lost < 1e-12);
     }
 
     #[test]

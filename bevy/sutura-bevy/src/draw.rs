@@ -7,6 +7,7 @@ use crate::space::Space;
 use crate::things::{Body, Thread};
 use crate::tube;
 use crate::world::Sutura;
+use bevy::asset::AssetEventSystems;
 use bevy::app::RunFixedMainLoop;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
@@ -97,9 +98,14 @@ pub(crate) fn build(app: &mut App) {
     app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0));
     let renders = resource_exists::<Assets<StandardMaterial>>;
     app.add_systems(Startup, make_materials.run_if(renders));
+    // Meshes that change are told to the renderer of the same picture.
     app.add_systems(
         PostUpdate,
-        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids).chain().before(TransformSystems::Propagate).run_if(renders),
+        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids)
+            .chain()
+            .before(TransformSystems::Propagate)
+            .before(AssetEventSystems)
+            .run_if(renders),
     );
 }
 

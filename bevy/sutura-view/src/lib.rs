@@ -16,10 +16,11 @@ pub use args::Args;
 pub use studio::{Picture, Studio};
 
 use bevy::app::RunFixedMainLoop;
+use bevy::asset::AssetEventSystems;
 use bevy::input::InputSystems;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;
-use bevy_egui::{EguiPlugin, EguiPrimaryContextPass};
+use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
 use camera::{Orbit, Surroundings};
 use control::{Typing, Viewer};
 use stage::Stage;
@@ -74,6 +75,8 @@ pub fn window(args: &Args) -> AppExit {
     });
     app.insert_resource(Zoom(zoom));
     app.add_systems(EguiPrimaryContextPass, panel::show);
+    // Letters that were not shown before are in the texture of letters in the picture that shows them; else they are missing there.
+    app.configure_sets(PostUpdate, EguiPostUpdateSet::PostProcessOutput.before(AssetEventSystems));
     if args.trial {
         trial::build(&mut app);
     }

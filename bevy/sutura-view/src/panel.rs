@@ -103,7 +103,17 @@ pub fn show(world: &mut World) {
     error_window(world, &context);
     let over = context.is_pointer_over_egui() || context.egui_wants_pointer_input();
     world.resource_mut::<Pointer>().busy = over;
-    world.resource_mut::<Typing>().0 = context.egui_wants_keyboard_input();
+    world.resource_mut::<Typing>().0 = typing(&context);
+}
+
+/// Whether the keyboard belongs to a field in which something is typed. What else was clicked, or reached by Tab, would keep the keys from the viewer, and take
+/// Space for a click: it lets go of them.
+fn typing(context: &egui::Context) -> bool {
+    let typing = context.text_edit_focused();
+    if !typing {
+        context.memory_mut(|m| m.focused().inspect(|id| m.surrender_focus(*id)));
+    }
+    typing
 }
 
 fn scene_panel(world: &mut World, context: &egui::Context) {
@@ -303,5 +313,51 @@ fn labels(world: &mut World, context: &egui::Context) {
                 Color32::from_rgb(255, 220, 120),
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_egui::egui::{Event, Key, Modifiers, PointerButton, RawInput};
+
+    #[test]
+    fn keys_belong_to_the_viewer_unless_something_is_typed() {
+        let context = egui::Context::default();
+        let mut number = 1.0;
+        let mut picture = |events: Vec<Event>| {
+            let (mut button, mut field) = (egui::Rect::NOTHING, egui::Rect::NOTHING);
+            let mut clicks = 0;
+            let input = RawInput { screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(300.0, 200.0))), events, ..RawInput::default() };
+            context
+                .run_ui(input, |ui| {
+                    let response = ui.button("button");
+                    clicks += u32::from(response.clicked());
+                    button = response.rect;
+                    field = ui.add(egui::DragValue::new(&mut number)).rect;
+                })
+                .textures_delta
+                .clear();
+            (button.center(), field.center(), clicks, typing(&context))
+        };
+        let at = |pos| move |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::default() };
+        let key = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::default() };
+        let (button, field, ..) = picture(vec![]);
+        // A button is clicked; Space after that is no click.
+        picture(vec![Event::PointerMoved(button)]);
+        picture(vec![at(button)(true)]);
+        assert_eq!(picture(vec![at(button)(false)]), (button, field, 1, false));
+        assert_eq!(picture(vec![key(Key::Space)]), (button, field, 0, false));
+        // Tab reaches the button and does not stay there.
+        assert!(!picture(vec![key(Key::Tab)]).3);
+        assert_eq!(picture(vec![key(Key::Space)]), (button, field, 0, false));
+        // A number is clicked and typed.
+        picture(vec![Event::PointerMoved(field)]);
+        picture(vec![at(field)(true)]);
+        assert!(picture(vec![at(field)(false)]).3);
+        assert!(picture(vec![Event::Text("7".into())]).3);
+        picture(vec![key(Key::Enter)]);
+        assert!(!picture(vec![]).3);
+        assert_eq!(number, 7.0);
     }
 }

@@ -33,8 +33,8 @@ pub struct PhysicsClock {
     pub frame: f64,
     /// Frames to do although it does not run; counts down.
     pub by_hand: u32,
-    /// Most time of a drawn frame that physics may take; where all the rest of a drawn frame takes longer, that long, so that slow pictures slow no physics. At
-    /// least one frame is done where one is due.
+    /// Most time of a drawn frame that physics may take; where all the rest of a drawn frame takes longer, that long (but not longer than 0.2 s), so that slow
+    /// pictures slow no physics. At least one frame is done where one is due.
     pub budget: Duration,
     /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
     /// running after a debt that only grows.
@@ -55,6 +55,8 @@ pub struct PhysicsClock {
     pub rate: f64,
     /// Drawn frames whose time counts for nothing yet.
     free: u32,
+    /// Real time over which `rate` was measured \[s\].
+    watched: f64,
     /// When physics of the last drawn frame was done.
     done: Option<Instant>,
 }
@@ -76,6 +78,7 @@ impl Default for PhysicsClock {
             ms: 0.0,
             rate: 0.0,
             free: 0,
+            watched: 0.0,
             done: None,
         }
     }
@@ -93,7 +96,7 @@ impl PhysicsClock {
     /// Forgets what is owed, as where another world begins. It is drawn as it begins: time before it counts for nothing, nor does the time of the drawn frame
     /// that made it, which may be long.
     pub fn restart(&mut self) {
-        (self.owed, self.lost, self.rate, self.frames, self.free) = (0.0, 0.0, 0.0, 0, 2);
+        (self.owed, self.lost, self.rate, self.watched, self.frames, self.free) = (0.0, 0.0, 0.0, 0.0, 0, 2);
     }
 
     /// Real time passed; how many frames are due.
@@ -115,14 +118,18 @@ impl PhysicsClock {
     }
 }
 
+/// Longest that physics goes on because the rest of a drawn frame took that long.
+const SHARE: Duration = Duration::from_millis(200);
+
 /// Does the frames of physics that are due.
 pub(crate) fn advance(world: &mut World) {
     let elapsed = world.resource::<Time<Real>>().delta_secs_f64();
     let mut clock = world.resource_mut::<PhysicsClock>();
+    let counts = clock.free == 0;
     let due = clock.pass(elapsed);
     clock.now = 0;
     let begin = Instant::now();
-    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max(begin - done));
+    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max((begin - done).min(SHARE)));
     for k in 0..due {
         if k > 0 && begin.elapsed() > budget {
             break;
@@ -140,9 +147,10 @@ pub(crate) fn advance(world: &mut World) {
     }
     let mut clock = world.resource_mut::<PhysicsClock>();
     clock.done = Some(Instant::now());
-    if elapsed > 0.0 {
-        // A mean over about a second.
-        let weight = (elapsed / (elapsed + 1.0)).clamp(0.0, 1.0);
+    if elapsed > 0.0 && counts {
+        // A mean over about a second, or what there is of it.
+        let weight = elapsed / (elapsed + clock.watched);
+        clock.watched = (clock.watched + elapsed).min(1.0);
         clock.rate += weight * (f64::from(clock.now) * clock.frame / elapsed - clock.rate);
     }
 }

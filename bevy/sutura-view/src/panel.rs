@@ -93,9 +93,17 @@ pub fn show(world: &mut World) {
     labels(world, &context);
     let viewer = world.resource::<Viewer>().clone();
     if viewer.panels {
-        scene_panel(world, &context);
-        parameter_panel(world, &context);
-        curve_panel(world, &context);
+        // A window of another size has its corners elsewhere: panels that stayed, or were pushed together in a small one, would lie on each other.
+        let (key, size) = (egui::Id::new("size of the window"), context.content_rect().size());
+        let resized = context.data_mut(|d| d.get_temp::<egui::Vec2>(key).is_some_and(|before| before != size));
+        context.data_mut(|d| d.insert_temp(key, size));
+        let at = |title: &'static str, x: f32, y: f32| {
+            let panel = egui::Window::new(title).default_pos([x, y]);
+            if resized { panel.current_pos([x, y]) } else { panel }
+        };
+        scene_panel(world, &context, at("Scene", 10.0, 10.0));
+        parameter_panel(world, &context, at("Parameters", size.x - 290.0, 10.0));
+        curve_panel(world, &context, at("Curves", 10.0, size.y - 260.0));
     }
     if viewer.help {
         help(world, &context);
@@ -116,8 +124,8 @@ fn typing(context: &egui::Context) -> bool {
     typing
 }
 
-fn scene_panel(world: &mut World, context: &egui::Context) {
-    egui::Window::new("Scene").default_pos([10.0, 10.0]).default_width(250.0).show(context, |ui| {
+fn scene_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
+    panel.default_width(250.0).show(context, |ui| {
         let (title, name) = (world.resource::<Stage>().title.clone(), world.resource::<Stage>().name.clone());
         ui.label(RichText::new(title).strong());
         egui::ComboBox::from_id_salt("samples").selected_text(&name).width(220.0).show_ui(ui, |ui| {
@@ -200,9 +208,8 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
     });
 }
 
-fn parameter_panel(world: &mut World, context: &egui::Context) {
-    let size = context.content_rect().size();
-    let window = egui::Window::new("Parameters").default_pos([size.x - 290.0, 10.0]).default_width(265.0).default_height(size.y - 120.0);
+fn parameter_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
+    let window = panel.default_width(265.0).default_height(context.content_rect().height() - 120.0);
     window.default_open(false).vscroll(true).show(context, |ui| {
         if world.resource::<Stage>().recorded {
             ui.label("A recording: nothing to change.");
@@ -223,10 +230,9 @@ fn parameter_panel(world: &mut World, context: &egui::Context) {
     });
 }
 
-fn curve_panel(world: &mut World, context: &egui::Context) {
-    let height = context.content_rect().height();
+fn curve_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
     let curves = world.resource::<Curves>();
-    egui::Window::new("Curves").default_pos([10.0, height - 260.0]).default_width(250.0).default_open(false).show(context, |ui| {
+    panel.default_width(250.0).default_open(false).show(context, |ui| {
         curve(ui, "greatest tension", "N", &curves.tension, None);
         curve(ui, "force of the hand and grips", "N", &curves.force, None);
         let frame = world.resource::<PhysicsClock>().frame;

@@ -19,8 +19,8 @@ use sutura_bevy::sutura::input::Recording;
 use sutura_bevy::{Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
 use sutura_scene::samples;
 
-/// Time that anything may take: the machine may be slow and busy.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Time that anything may take, and pictures that there are to be in it: the machine may be slow and busy, and some steps do a thing in every picture.
+const PATIENCE: (Duration, u32) = (Duration::from_secs(60), 200);
 
 /// What a look at a thing under way says: it is done, not yet, or wrong.
 type Verdict = Result<bool, String>;
@@ -122,11 +122,19 @@ impl Run {
         *pictures += 1;
         match (step.look)(world, notes, *pictures) {
             Ok(true) => (self.step, self.begun) = (self.step + 1, None),
-            Ok(false) if when.elapsed() < PATIENCE => {}
+            Ok(false) if when.elapsed() < PATIENCE.0 || *pictures < PATIENCE.1 => {}
             Ok(false) => {
                 let clock = world.resource::<PhysicsClock>();
                 let state = format!("running {}, {} frames of physics, {:.1} ms each", clock.running, clock.frames, clock.ms);
-                fail(world, step.name, &format!("did not come within {} s and {pictures} pictures ({state}; {})", PATIENCE.as_secs(), world.resource::<Viewer>().message.clone()));
+                fail(
+                    world,
+                    step.name,
+                    &format!(
+                        "did not come within {} s and {pictures} pictures ({state}; {})",
+                        when.elapsed().as_secs(),
+                        world.resource::<Viewer>().message.clone()
+                    ),
+                );
                 self.step = STEPS.len() + 1;
             }
             Err(why) => {

@@ -33,9 +33,10 @@ pub struct PhysicsClock {
     pub frame: f64,
     /// Frames to do although it does not run; counts down.
     pub by_hand: u32,
-    /// Most time of a drawn frame that physics may take; where all the rest of a drawn frame takes longer, that long (but not longer than 0.2 s), so that slow
-    /// pictures slow no physics. At least one frame is done where one is due.
+    /// Most time of a drawn frame that physics may take. At least one frame is done where one is due.
     pub budget: Duration,
+    /// Where all the rest of a drawn frame takes longer than `budget`, physics may take as long, but not longer than this: so slow pictures slow no physics.
+    pub share: Duration,
     /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
     /// running after a debt that only grows.
     pub most_owed: f64,
@@ -69,6 +70,7 @@ impl Default for PhysicsClock {
             frame: 1.0 / 60.0,
             by_hand: 0,
             budget: Duration::from_millis(200),
+            share: Duration::ZERO,
             most_owed: 1.0,
             owed: 0.0,
             lost: 0.0,
@@ -118,9 +120,6 @@ impl PhysicsClock {
     }
 }
 
-/// Longest that physics goes on because the rest of a drawn frame took that long.
-const SHARE: Duration = Duration::from_millis(200);
-
 /// Does the frames of physics that are due.
 pub(crate) fn advance(world: &mut World) {
     let elapsed = world.resource::<Time<Real>>().delta_secs_f64();
@@ -129,7 +128,7 @@ pub(crate) fn advance(world: &mut World) {
     let due = clock.pass(elapsed);
     clock.now = 0;
     let begin = Instant::now();
-    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max((begin - done).min(SHARE)));
+    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max((begin - done).min(clock.share)));
     for k in 0..due {
         if k > 0 && begin.elapsed() > budget {
             break;

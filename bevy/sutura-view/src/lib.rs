@@ -63,8 +63,9 @@ pub fn window(args: &Args) -> AppExit {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }).set(quiet()));
     app.add_plugins((EguiPlugin::default(), ViewerPlugin));
     app.world_mut().resource_mut::<PhysicsClock>().running = !args.paused;
-    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second.
+    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second, and half of a slower one.
     app.world_mut().resource_mut::<PhysicsClock>().budget = std::time::Duration::from_millis(22);
+    app.world_mut().resource_mut::<PhysicsClock>().share = std::time::Duration::from_millis(200);
     let (name, zoom) = (args.scene.clone(), args.zoom as f32);
     app.add_systems(PostStartup, (move |world: &mut World| control::open(world, &name), spawn_camera).chain());
     app.world_mut().resource_mut::<Viewer>().least_width = args.least_width;

@@ -90,6 +90,8 @@ pub fn recognize_knots(
 pub fn show(world: &mut World) {
     let mut contexts = world.query_filtered::<&mut EguiContext, With<PrimaryEguiContext>>();
     let Some(context) = contexts.iter_mut(world).next().map(|mut c| c.get_mut().clone()) else { return };
+    // Where pictures are slow, a click of the mouse spans long ones: it is one all the same.
+    context.options_mut(|o| o.input_options.max_click_duration = 5.0);
     labels(world, &context);
     let viewer = world.resource::<Viewer>().clone();
     if viewer.panels {

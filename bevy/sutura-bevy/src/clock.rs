@@ -35,6 +35,8 @@ pub struct PhysicsClock {
     pub by_hand: u32,
     /// Most time of a drawn frame that physics may take. At least one frame is done where one is due.
     pub budget: Duration,
+    /// Where all the rest of a drawn frame takes longer than `budget`, physics may take as long, but not longer than this: so slow pictures slow no physics.
+    pub share: Duration,
     /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
     /// running after a debt that only grows.
     pub most_owed: f64,
@@ -52,6 +54,12 @@ pub struct PhysicsClock {
     pub ms: f64,
     /// Simulated over real time reached lately; 1 is real time.
     pub rate: f64,
+    /// Drawn frames whose time counts for nothing yet.
+    free: u32,
+    /// Real time over which `rate` was measured \[s\].
+    watched: f64,
+    /// When physics of the last drawn frame was done.
+    done: Option<Instant>,
 }
 
 impl Default for PhysicsClock {
@@ -62,6 +70,7 @@ impl Default for PhysicsClock {
             frame: 1.0 / 60.0,
             by_hand: 0,
             budget: Duration::from_millis(200),
+            share: Duration::ZERO,
             most_owed: 1.0,
             owed: 0.0,
             lost: 0.0,
@@ -70,6 +79,9 @@ impl Default for PhysicsClock {
             remaining: 0,
             ms: 0.0,
             rate: 0.0,
+            free: 0,
+            watched: 0.0,
+            done: None,
         }
     }
 }
@@ -83,13 +95,16 @@ impl PhysicsClock {
     pub fn is_late(&self) -> bool {
         self.running && self.owed > 0.5 * self.most_owed
     }
-    /// Forgets what is owed, as after a pause or where another world begins.
+    /// Forgets what is owed, as where another world begins. It is drawn as it begins: time before it counts for nothing, nor does the time of the drawn frame
+    /// that made it, which may be long.
     pub fn restart(&mut self) {
-        (self.owed, self.lost, self.rate, self.frames) = (0.0, 0.0, 0.0, 0);
+        (self.owed, self.lost, self.rate, self.watched, self.frames, self.free) = (0.0, 0.0, 0.0, 0.0, 0, 2);
     }
 
     /// Real time passed; how many frames are due.
     fn pass(&mut self, elapsed: f64) -> u32 {
+        let elapsed = if self.free > 0 { 0.0 } else { elapsed };
+        self.free = self.free.saturating_sub(1);
         if !self.running {
             self.owed = 0.0;
             return std::mem::take(&mut self.by_hand);
@@ -109,9 +124,11 @@ impl PhysicsClock {
 pub(crate) fn advance(world: &mut World) {
     let elapsed = world.resource::<Time<Real>>().delta_secs_f64();
     let mut clock = world.resource_mut::<PhysicsClock>();
+    let counts = clock.free == 0;
     let due = clock.pass(elapsed);
     clock.now = 0;
-    let (begin, budget) = (Instant::now(), clock.budget);
+    let begin = Instant::now();
+    let budget = clock.done.map_or(clock.budget, |done| clock.budget.max((begin - done).min(clock.share)));
     for k in 0..due {
         if k > 0 && begin.elapsed() > budget {
             break;
@@ -128,9 +145,11 @@ pub(crate) fn advance(world: &mut World) {
         }
     }
     let mut clock = world.resource_mut::<PhysicsClock>();
-    if elapsed > 0.0 {
-        // A mean over about a second.
-        let weight = (elapsed / (elapsed + 1.0)).clamp(0.0, 1.0);
+    clock.done = Some(Instant::now());
+    if elapsed > 0.0 && counts {
+        // A mean over about a second, or what there is of it.
+        let weight = elapsed / (elapsed + clock.watched);
+        clock.watched = (clock.watched + elapsed).min(1.0);
         clock.rate += weight * (f64::from(clock.now) * clock.frame / elapsed - clock.rate);
     }
 }
@@ -146,6 +165,16 @@ mod tests {
         assert!((clock.lost - 1.5).abs() < 1e-12 && clock.is_late());
         let mut paused = PhysicsClock { running: false, by_hand: 2, ..PhysicsClock::default() };
         assert_eq!((paused.pass(1.0), paused.pass(1.0)), (2, 0));
+    }
+
+    #[test]
+    fn another_world_begins_at_its_beginning() {
+        let mut clock = PhysicsClock::default();
+        assert_eq!(clock.pass(0.5), 30);
+        clock.restart();
+        // The frame in which it is made, and the one that shows how long that took.
+        assert_eq!((clock.pass(0.1), clock.pass(5.0), clock.pass(0.1)), (0, 0, 6));
+        assert!(clock.lost < 1e-12);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::things::{Body, Thread};
 use crate::world::Sutura;
 use crate::{tip, tube};
 use bevy::app::RunFixedMainLoop;
+use bevy::asset::AssetEventSystems;
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::visibility::NoFrustumCulling;
 use bevy::mesh::skinning::{SkinnedMesh, SkinnedMeshInverseBindposes};
@@ -96,9 +97,14 @@ pub(crate) fn build(app: &mut App) {
     app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0));
     let renders = resource_exists::<Assets<StandardMaterial>>;
     app.add_systems(Startup, make_materials.run_if(renders));
+    // Meshes that change are told to the renderer of the same picture.
     app.add_systems(
         PostUpdate,
-        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids, tip::mesh_tips).chain().before(TransformSystems::Propagate).run_if(renders),
+        (mesh_strands, pose_bones, color_strands, mesh_solids, pose_solids, tip::mesh_tips)
+            .chain()
+            .before(TransformSystems::Propagate)
+            .before(AssetEventSystems)
+            .run_if(renders),
     );
 }
 

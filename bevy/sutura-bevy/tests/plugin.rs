@@ -381,6 +381,11 @@ fn physics_that_cannot_keep_up_is_bounded_and_says_so() {
     assert!(clock.is_late() && clock.owed <= clock.most_owed);
     assert!((clock.lost + clock.owed + 100.0 * clock.frame - 10.0).abs() < 1e-6, "{clock:?}");
     assert!((clock.rate - 10.0 / 60.0).abs() < 0.01, "{clock:?}");
+    // As much as the rest of a picture takes: one that is slow to draw leaves time for more than one frame.
+    app.world_mut().resource_mut::<PhysicsClock>().share = Duration::from_secs(10);
+    std::thread::sleep(Duration::from_millis(200));
+    picture(&mut app, 0.1);
+    assert!(app.world().resource::<PhysicsClock>().now > 1);
 }
 
 #[test]

@@ -21,6 +21,8 @@ pub struct Viewer {
     pub tension: bool,
     /// Tension that is shown as blue and as red \[N\].
     pub tension_scale: (f64, f64),
+    /// Whether that is as somebody wants it, and does not follow what there is.
+    pub tension_fixed: bool,
     /// Material frames.
     pub frames: bool,
     /// Contacts.
@@ -57,7 +59,8 @@ impl Default for Viewer {
     fn default() -> Self {
         Viewer {
             tension: false,
-            tension_scale: (0.0, 1.0),
+            tension_scale: (0.0, 1e-3),
+            tension_fixed: false,
             frames: false,
             contacts: false,
             primitives: false,
@@ -115,7 +118,7 @@ pub fn open(world: &mut World, name: &str) {
     stage::open(world, name);
     if world.resource::<Stage>().generation != before {
         let mut viewer = world.resource_mut::<Viewer>();
-        (viewer.grips, viewer.message) = ([None; 2], String::new());
+        (viewer.grips, viewer.message, viewer.tension_scale) = ([None; 2], String::new(), Viewer::default().tension_scale);
     }
 }
 
@@ -375,11 +378,11 @@ fn give_back(world: &mut World) {
 }
 
 /// Strands show the tension where that is wanted; its scale follows what there is.
-pub fn show_tension(mut viewer: ResMut<Viewer>, mut strands: Query<&mut Strand>) {
-    if viewer.tension {
+pub fn show_tension(mut viewer: ResMut<Viewer>, time: Res<Time<Real>>, mut strands: Query<&mut Strand>) {
+    if viewer.tension && !viewer.tension_fixed {
         let most = strands.iter().flat_map(|s| &s.tensions).fold(0.0, |a: f64, t| a.max(*t));
-        // It grows at once and shrinks slowly.
-        let kept = viewer.tension_scale.1 * 0.995;
+        // It grows at once and shrinks slowly, by half in two seconds.
+        let kept = viewer.tension_scale.1 * (-0.35 * time.delta_secs_f64()).exp();
         viewer.tension_scale = (0.0, most.max(kept).max(1e-3));
     }
     let scale = viewer.tension.then_some(viewer.tension_scale);

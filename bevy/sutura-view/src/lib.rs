@@ -17,10 +17,11 @@ pub use args::Args;
 pub use studio::{Picture, Studio};
 
 use bevy::app::RunFixedMainLoop;
+use bevy::asset::AssetEventSystems;
 use bevy::input::InputSystems;
 use bevy::log::LogPlugin;
 use bevy::prelude::*;
-use bevy_egui::{EguiPlugin, EguiPrimaryContextPass};
+use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass};
 use camera::{Orbit, Surroundings};
 use control::{Typing, Viewer};
 use stage::Stage;
@@ -66,8 +67,9 @@ pub fn window(args: &Args) -> AppExit {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }).set(quiet()));
     app.add_plugins((EguiPlugin::default(), ViewerPlugin));
     app.world_mut().resource_mut::<PhysicsClock>().running = !args.paused;
-    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second.
+    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second, and half of a slower one.
     app.world_mut().resource_mut::<PhysicsClock>().budget = std::time::Duration::from_millis(22);
+    app.world_mut().resource_mut::<PhysicsClock>().share = std::time::Duration::from_millis(200);
     let (name, zoom) = (args.scene.clone(), args.zoom as f32);
     app.add_systems(PostStartup, (move |world: &mut World| control::open(world, &name), spawn_camera).chain());
     app.world_mut().resource_mut::<Viewer>().least_width = args.least_width;
@@ -78,6 +80,8 @@ pub fn window(args: &Args) -> AppExit {
     });
     app.insert_resource(Zoom(zoom));
     app.add_systems(EguiPrimaryContextPass, panel::show);
+    // Letters that were not shown before are in the texture of letters in the picture that shows them; else they are missing there.
+    app.configure_sets(PostUpdate, EguiPostUpdateSet::PostProcessOutput.before(AssetEventSystems));
     if args.trial {
         trial::build(&mut app);
     }

@@ -90,12 +90,22 @@ pub fn recognize_knots(
 pub fn show(world: &mut World) {
     let mut contexts = world.query_filtered::<&mut EguiContext, With<PrimaryEguiContext>>();
     let Some(context) = contexts.iter_mut(world).next().map(|mut c| c.get_mut().clone()) else { return };
+    // Where pictures are slow, a click of the mouse spans long ones: it is one all the same.
+    context.options_mut(|o| o.input_options.max_click_duration = 5.0);
     labels(world, &context);
     let viewer = world.resource::<Viewer>().clone();
     if viewer.panels {
-        scene_panel(world, &context);
-        parameter_panel(world, &context);
-        curve_panel(world, &context);
+        // A window of another size has its corners elsewhere: panels that stayed, or were pushed together in a small one, would lie on each other.
+        let (key, size) = (egui::Id::new("size of the window"), context.content_rect().size());
+        let resized = context.data_mut(|d| d.get_temp::<egui::Vec2>(key).is_some_and(|before| before != size));
+        context.data_mut(|d| d.insert_temp(key, size));
+        let at = |title: &'static str, x: f32, y: f32| {
+            let panel = egui::Window::new(title).default_pos([x, y]);
+            if resized { panel.current_pos([x, y]) } else { panel }
+        };
+        scene_panel(world, &context, at("Scene", 10.0, 10.0));
+        parameter_panel(world, &context, at("Parameters", size.x - 290.0, 10.0));
+        curve_panel(world, &context, at("Curves", 10.0, size.y - 260.0));
     }
     if viewer.help {
         help(world, &context);
@@ -103,11 +113,21 @@ pub fn show(world: &mut World) {
     error_window(world, &context);
     let over = context.is_pointer_over_egui() || context.egui_wants_pointer_input();
     world.resource_mut::<Pointer>().busy = over;
-    world.resource_mut::<Typing>().0 = context.egui_wants_keyboard_input();
+    world.resource_mut::<Typing>().0 = typing(&context);
 }
 
-fn scene_panel(world: &mut World, context: &egui::Context) {
-    egui::Window::new("Scene").default_pos([10.0, 10.0]).default_width(250.0).show(context, |ui| {
+/// Whether the keyboard belongs to a field in which something is typed. What else was clicked, or reached by Tab, would keep the keys from the viewer, and take
+/// Space for a click: it lets go of them.
+fn typing(context: &egui::Context) -> bool {
+    let typing = context.text_edit_focused();
+    if !typing {
+        context.memory_mut(|m| m.focused().inspect(|id| m.surrender_focus(*id)));
+    }
+    typing
+}
+
+fn scene_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
+    panel.default_width(250.0).show(context, |ui| {
         let (title, name) = (world.resource::<Stage>().title.clone(), world.resource::<Stage>().name.clone());
         ui.label(RichText::new(title).strong());
         egui::ComboBox::from_id_salt("samples").selected_text(&name).width(220.0).show_ui(ui, |ui| {
@@ -190,9 +210,8 @@ fn scene_panel(world: &mut World, context: &egui::Context) {
     });
 }
 
-fn parameter_panel(world: &mut World, context: &egui::Context) {
-    let size = context.content_rect().size();
-    let window = egui::Window::new("Parameters").default_pos([size.x - 290.0, 10.0]).default_width(265.0).default_height(size.y - 120.0);
+fn parameter_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
+    let window = panel.default_width(265.0).default_height(context.content_rect().height() - 120.0);
     window.default_open(false).vscroll(true).show(context, |ui| {
         if world.resource::<Stage>().recorded {
             ui.label("A recording: nothing to change.");
@@ -213,10 +232,9 @@ fn parameter_panel(world: &mut World, context: &egui::Context) {
     });
 }
 
-fn curve_panel(world: &mut World, context: &egui::Context) {
-    let height = context.content_rect().height();
+fn curve_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'_>) {
     let curves = world.resource::<Curves>();
-    egui::Window::new("Curves").default_pos([10.0, height - 260.0]).default_width(250.0).default_open(false).show(context, |ui| {
+    panel.default_width(250.0).default_open(false).show(context, |ui| {
         curve(ui, "greatest tension", "N", &curves.tension, None);
         curve(ui, "force of the hand and grips", "N", &curves.force, None);
         let frame = world.resource::<PhysicsClock>().frame;
@@ -303,5 +321,51 @@ fn labels(world: &mut World, context: &egui::Context) {
                 Color32::from_rgb(255, 220, 120),
             );
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_egui::egui::{Event, Key, Modifiers, PointerButton, RawInput};
+
+    #[test]
+    fn keys_belong_to_the_viewer_unless_something_is_typed() {
+        let context = egui::Context::default();
+        let mut number = 1.0;
+        let mut picture = |events: Vec<Event>| {
+            let (mut button, mut field) = (egui::Rect::NOTHING, egui::Rect::NOTHING);
+            let mut clicks = 0;
+            let input = RawInput { screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(300.0, 200.0))), events, ..RawInput::default() };
+            context
+                .run_ui(input, |ui| {
+                    let response = ui.button("button");
+                    clicks += u32::from(response.clicked());
+                    button = response.rect;
+                    field = ui.add(egui::DragValue::new(&mut number)).rect;
+                })
+                .textures_delta
+                .clear();
+            (button.center(), field.center(), clicks, typing(&context))
+        };
+        let at = |pos| move |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::default() };
+        let key = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::default() };
+        let (button, field, ..) = picture(vec![]);
+        // A button is clicked; Space after that is no click.
+        picture(vec![Event::PointerMoved(button)]);
+        picture(vec![at(button)(true)]);
+        assert_eq!(picture(vec![at(button)(false)]), (button, field, 1, false));
+        assert_eq!(picture(vec![key(Key::Space)]), (button, field, 0, false));
+        // Tab reaches the button and does not stay there.
+        assert!(!picture(vec![key(Key::Tab)]).3);
+        assert_eq!(picture(vec![key(Key::Space)]), (button, field, 0, false));
+        // A number is clicked and typed.
+        picture(vec![Event::PointerMoved(field)]);
+        picture(vec![at(field)(true)]);
+        assert!(picture(vec![at(field)(false)]).3);
+        assert!(picture(vec![Event::Text("7".into())]).3);
+        picture(vec![key(Key::Enter)]);
+        assert!(!picture(vec![]).3);
+        assert_eq!(number, 7.0);
     }
 }

@@ -153,7 +153,7 @@ impl Studio {
         let mut viewer = self.app.world_mut().resource_mut::<crate::control::Viewer>();
         viewer.tension = scale.is_some();
         if let Some(scale) = scale {
-            viewer.tension_scale = scale;
+            (viewer.tension_scale, viewer.tension_fixed) = (scale, true);
         }
     }
 

@@ -14,12 +14,13 @@ use bevy_egui::{EguiContext, EguiPrimaryContextPass, PrimaryEguiContext, egui};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::input::Recording;
 use sutura_bevy::{Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
 use sutura_scene::samples;
 
-/// Time that anything may take: the machine may be slow and busy.
-const PATIENCE: Duration = Duration::from_secs(60);
+/// Time that anything may take, and pictures that there are to be in it: the machine may be slow and busy, and some steps do a thing in every picture.
+const PATIENCE: (Duration, u32) = (Duration::from_secs(60), 200);
 
 /// What a look at a thing under way says: it is done, not yet, or wrong.
 type Verdict = Result<bool, String>;
@@ -52,6 +53,7 @@ const STEPS: &[Step] = &[
     Step { name: "a picture is written (F12)", act: |w, n| press(w, n, KeyCode::F12), look: |_, notes, _| pictures(&notes.folder, 1) },
     Step { name: "a sequence of pictures begins (F11)", act: |w, n| press(w, n, KeyCode::F11), look: |world, _, n| sequence(world, n, 3) },
     Step { name: "a sequence of pictures is written (F11)", act: |w, n| press(w, n, KeyCode::F11), look: sequence_is_written },
+    Step { name: "it is paused (Space)", act: |w, n| press(w, n, KeyCode::Space), look: |w, _, _| Ok(!w.resource::<PhysicsClock>().running) },
     Step { name: "the scene begins again (Backspace)", act: |w, n| press(w, n, KeyCode::Backspace), look: |w, n, k| opened(w, n, "", k) },
     Step { name: "a thread follows the mouse", act: take_thread, look: thread_follows },
     Step { name: "what is let go is let go", act: |w, n| button(w, n, MouseButton::Left, ButtonState::Released), look: |w, _, n| let_go(w, n) },
@@ -120,11 +122,19 @@ impl Run {
         *pictures += 1;
         match (step.look)(world, notes, *pictures) {
             Ok(true) => (self.step, self.begun) = (self.step + 1, None),
-            Ok(false) if when.elapsed() < PATIENCE => {}
+            Ok(false) if when.elapsed() < PATIENCE.0 || *pictures < PATIENCE.1 => {}
             Ok(false) => {
                 let clock = world.resource::<PhysicsClock>();
                 let state = format!("running {}, {} frames of physics, {:.1} ms each", clock.running, clock.frames, clock.ms);
-                fail(world, step.name, &format!("did not come within {} s ({state}; {})", PATIENCE.as_secs(), world.resource::<Viewer>().message.clone()));
+                fail(
+                    world,
+                    step.name,
+                    &format!(
+                        "did not come within {} s and {pictures} pictures ({state}; {})",
+                        when.elapsed().as_secs(),
+                        world.resource::<Viewer>().message.clone()
+                    ),
+                );
                 self.step = STEPS.len() + 1;
             }
             Err(why) => {
@@ -287,7 +297,10 @@ fn take_thread(world: &mut World, notes: &mut Notes) {
     notes.at = Vec2::ZERO;
 }
 
+/// The pointer takes a thread while the scene is paused, since one that falls may be gone when a slow picture shows where it was. Then the scene goes on, and
+/// the pointer moves up by a part of the window's height, where a thread that hangs has room.
 fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdict {
+    let up = world.get::<Window>(notes.window).map_or(0.0, Window::height) / 12.0;
     match pictures {
         // Panels are gone, and the camera is there.
         0..5 => Ok(false),
@@ -298,35 +311,39 @@ fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
             Ok(false)
         }
         6 => {
-            notes.at = middle(world).unwrap_or(notes.at);
-            let at = notes.at;
-            point(world, notes, at);
             button(world, notes, MouseButton::Left, ButtonState::Pressed);
             Ok(false)
         }
-        // Taken; then 40 pixels up, where a thread that hangs has room.
-        7..10 => Ok(false),
-        10..30 => {
-            let Some(Held::Thread(grip)) = world.resource::<Hand>().held else { return Err(nothing_held(world, notes)) };
-            let now = world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position);
-            let place = world.resource::<Space>().place(now.unwrap_or_default());
-            if pictures == 10 {
-                notes.place = place;
-            }
-            let at = notes.at - Vec2::new(0.0, 2.0) * (pictures - 9) as f32;
+        7 => Ok(false),
+        8 => {
+            let grip = grip_of_hand(world, notes)?;
+            notes.place = world.resource::<Space>().place(grip);
+            press(world, notes, KeyCode::Space);
+            Ok(false)
+        }
+        9..30 => {
+            grip_of_hand(world, notes)?;
+            let at = notes.at - Vec2::new(0.0, up * (pictures - 8) as f32 / 21.0);
             point(world, notes, at);
             Ok(false)
         }
         _ => {
-            let Some(Held::Thread(grip)) = world.resource::<Hand>().held else { return Err("the mouse lost what it held".into()) };
-            let now = world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position).unwrap_or_default();
+            let now = grip_of_hand(world, notes)?;
             let moved = pixels(world, world.resource::<Space>().place(now)).zip(pixels(world, notes.place)).map(|(a, b)| a - b);
             match moved {
-                Some(m) if m.x.abs() < 6.0 && (m.y + 40.0).abs() < 6.0 => Ok(true),
-                _ if pictures < 150 => Ok(false),
-                _ => Err(format!("the mouse went 40 pixels up, what it holds {moved:?}")),
+                Some(m) if m.x.abs() < 6.0 && (m.y + up).abs() < 6.0 => Ok(true),
+                _ if pictures < 60 => Ok(false),
+                _ => Err(format!("the mouse went {up} pixels up, what it holds {moved:?}")),
             }
         }
+    }
+}
+
+/// Where the mouse holds a thread.
+fn grip_of_hand(world: &mut World, notes: &Notes) -> Result<DVec3, String> {
+    match world.resource::<Hand>().held {
+        Some(Held::Thread(grip)) => world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position).ok_or_else(|| "its grip is gone".into()),
+        _ => Err(nothing_held(world, notes)),
     }
 }
 

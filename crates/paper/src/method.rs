@@ -84,6 +84,8 @@ pub struct Ours {
     grips: Vec<(Handle<Grip>, Hold, Held)>,
     /// Steps in which something was not found.
     pub incidents: usize,
+    /// Frames in which an inextensible thread did not keep its length.
+    pub off_length: usize,
     rest: Vec<f64>,
     substeps: u32,
 }
@@ -138,7 +140,7 @@ impl Ours {
             let kind = sutura::LoadKind::Point { place: Place::Particle(vertex as u32), force, torque: DVec3::ZERO };
             world.insert_load(&sutura::LoadSpec { rod, kind }).expect("loads of the experiments are valid");
         }
-        Ours { world, rod, grips, incidents: 0, rest, substeps }
+        Ours { world, rod, grips, incidents: 0, off_length: 0, rest, substeps }
     }
     /// Lets the end go that was held last.
     pub fn let_go(&mut self) {
@@ -168,7 +170,9 @@ impl Solver for Ours {
             };
             self.world.set_grip_pose(*grip, pose).expect("a pose of the experiment");
         }
-        self.incidents += self.world.step(frame).incidents.len();
+        let incidents = self.world.step(frame).incidents;
+        let off = incidents.iter().filter(|i| matches!(i.kind, sutura::IncidentKind::LengthNotKept { .. })).count();
+        (self.incidents, self.off_length) = (self.incidents + incidents.len() - off, self.off_length + off);
     }
     fn time(&self) -> f64 {
         self.world.time()

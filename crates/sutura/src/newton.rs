@@ -23,9 +23,6 @@ pub(crate) const LENGTH_TOLERANCE: f64 = 5e-6;
 /// Elongation that is as good as none: held any longer, multipliers grow by 100 EA times it in each substep.
 pub(crate) const LENGTH_FLOOR: f64 = 1e-11;
 
-/// Turn of an iteration \[rad\] below which elongation of second order is not worth another one.
-const CALM: f64 = 1e-4;
-
 /// Turn \[rad\] of an iteration, and move in hundreds of radii, below which nothing moves at all.
 const STILL: f64 = 1e-7;
 
@@ -76,7 +73,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
-    let kept_before = length_error(model, &scratch.start) < LENGTH_TOLERANCE;
+    let kept_before = keeps_lengths(model, &scratch.start);
     let (mut before, mut moved_before, mut stretched_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
@@ -134,16 +131,17 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
         (before, moved_before) = (out.turn, out.residual);
         let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
-        // A turn leaves an elongation of second order, which the next one takes away. What else is left, of a thread that had its length, must not last.
-        let watched = kept_before && out.turn < CALM && out.iterations <= PATIENCE.min(settings.newton_max);
+        // What a thread that had its length is off by where nothing moves any more must not last; while it moves there are elongations of second order. With
+        // contacts an iterate may count as at rest that is still on its way.
         let still = out.turn < STILL && out.residual < 100.0 * STILL;
+        let watched = kept_before && still && out.iterations <= PATIENCE.min(settings.newton_max);
         let lasts = stretched > LASTING * stretched_before;
-        if rests && lasts && stretched > if watched && still { LENGTH_FLOOR } else { LENGTH_TOLERANCE } {
+        if rests && lasts && (still || scratch.rows.is_empty()) && stretched > if watched { LENGTH_FLOOR } else { LENGTH_TOLERANCE } {
             out.infeasible = true;
             break;
         }
-        let watched = watched && !lasts && out.iterations < PATIENCE.min(settings.newton_max);
-        let owed = stretched > if watched { LENGTH_FLOOR.max(out.turn * out.turn) } else { LENGTH_TOLERANCE };
+        let again = watched && !lasts && out.iterations < PATIENCE.min(settings.newton_max);
+        let owed = stretched > if again { LENGTH_FLOOR } else { LENGTH_TOLERANCE };
         stretched_before = stretched;
         if rests
             && !owed
@@ -353,8 +351,8 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
 }
 
 /// Whether every element whose length is a constraint keeps it.
-pub(crate) fn keeps_lengths(model: &Model, state: &State) -> bool {
-    length_error(model, &state.position) < LENGTH_TOLERANCE
+pub(crate) fn keeps_lengths(model: &Model, positions: &[DVec3]) -> bool {
+    length_error(model, positions) < LENGTH_TOLERANCE
 }
 
 /// Largest |elongation| of an element whose length is a constraint: a second-order error of the turn that Newton just made.

@@ -68,6 +68,9 @@ const INFEASIBLE: &str = "an inextensible thread cannot keep its length";
 /// Why one is that would not come to an end.
 const TOO_MUCH: &str = "more work than a substep may take";
 
+/// Halvings after which threads that do not stretch are let stretch, if there is still no acceptable substep.
+const GIVE_WAY: u32 = 4;
+
 /// Accepted substeps of one length before twice the length is tried again.
 const CALM: u32 = 6;
 
@@ -133,8 +136,15 @@ fn advance(
             // Shorter substeps are of no help to a thread that cannot keep its length, or is off it already.
             let last = depth >= model.settings.halvings || scratch.exhausted();
             let from = &scratch.saved[depth as usize];
-            let tried = (reason == INFEASIBLE || last) && give_way(model, state, from, reason == INFEASIBLE);
-            let gives_way = tried || give_way(model, from, from, false);
+            let off = !newton::keeps_lengths(model, &from.position) && !newton::keeps_lengths(model, &state.position);
+            let least = if last || depth >= GIVE_WAY {
+                Some(0.0)
+            } else if reason == INFEASIBLE {
+                Some(newton::LENGTH_FLOOR)
+            } else {
+                off.then_some(newton::LENGTH_TOLERANCE)
+            };
+            let gives_way = least.is_some_and(|least| give_way(model, state, from, least));
             restore(state, scratch, depth);
             reel::follow(model, state);
             if gives_way {
@@ -159,14 +169,14 @@ fn advance(
     }
 }
 
-/// Inextensible threads that are off their length in a state that was tried, be it `little`, stretch as their material does, as a thread does in truth, from
-/// the last good state to the end of the step. Whether there are any.
-fn give_way(model: &mut Model, tried: &State, from: &State, little: bool) -> bool {
+/// Inextensible threads that are off their length by the `least` elongation or more in a state that was tried stretch as their material does, as a thread does
+/// in truth, from the last good state to the end of the step. Whether there are any.
+fn give_way(model: &mut Model, tried: &State, from: &State, least: f64) -> bool {
     let mut any = false;
     for slot in 0..model.rods.len() as u32 {
         let Some(rod) = model.rods.at(slot).filter(|r| model.inextensible[r.first as usize]) else { continue };
         let elongation = most_elongated(model, rod, tried);
-        if elongation.abs() > if little { newton::LENGTH_FLOOR } else { newton::LENGTH_TOLERANCE } {
+        if elongation.abs() >= least {
             // A trial from a length that is off may end anywhere.
             let off = [from, tried].map(|s| longer_by(model, rod, s)).into_iter().find(|off| off.abs() > newton::LENGTH_TOLERANCE);
             model.give_way(slot, from, off.is_some_and(|off| off < 0.0));
@@ -251,7 +261,7 @@ fn solve(
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
             Err(NOT_FINITE)
-        } else if outcome.infeasible || !outcome.converged && depth == model.settings.halvings && !newton::keeps_lengths(model, state) {
+        } else if outcome.infeasible || !outcome.converged && depth == model.settings.halvings && !newton::keeps_lengths(model, &state.position) {
             Err(INFEASIBLE)
         } else if !outcome.converged && scratch.exhausted() {
             Err(TOO_MUCH)

@@ -10,7 +10,7 @@ pub struct StepReport {
     pub time: f64,
     /// Substeps accepted.
     pub substeps: u32,
-    /// Substeps thrown away and done again as two halves.
+    /// Substeps thrown away and done again: as two halves, or with a thread that stretches where it cannot keep its length.
     pub rejected: u32,
     /// Newton iterations, those of rejected substeps among them.
     pub newton_iterations: u32,

@@ -41,6 +41,6 @@ pub use model::section::{Along, Profile, Section};
 pub use model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
 pub use model::weld::{Weld, WeldRest, WeldSpec};
 pub use params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrder};
-pub use report::{Incident, IncidentKind, StepReport};
+pub use report::{Incident, IncidentKind, Rejection, StepReport};
 pub use view::{ContactView, ContactWith, Energy, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

@@ -148,13 +148,19 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
             && row::shape::settled(model, state, scratch, out.iterations)
-            && !row::thread::extend(model, state, scratch)
+            && !extends(model, state, scratch)
         {
             out.converged = true;
             break;
         }
     }
     out
+}
+
+/// Whether contacts were added that the iterate calls for.
+fn extends(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
+    let threads = row::thread::extend(model, state, scratch);
+    row::shape::extend(model, state, scratch) || threads
 }
 
 /// Tension and shear force that the start of the substep carries into the geometric stiffness.

@@ -151,8 +151,9 @@ impl Default for Settings {
     }
 }
 
-/// Normal stiffness of a contact over E times the radius (the scale of Hertz stiffness of two crossed cylinders).
-pub(crate) const CONTACT_STIFFNESS: f64 = 4.0;
+/// Depth, in sums of radii, up to which a contact of two threads is a linear spring; beyond, it follows Hertz. Without it a light contact would be the
+/// softer the lighter it is, and a sudden load would find it soft.
+pub(crate) const LIGHT: f64 = 0.005;
 
 /// Normal force over E r^2 beyond which a contact with a shape that stays as it is goes into the rods' matrix.
 pub(crate) const FIRM: f64 = 1e-8;
@@ -164,15 +165,22 @@ pub(crate) const OVERLAP: f64 = 0.04;
 /// Overlap that no approach may go beyond.
 const DEEPEST: f64 = 0.05;
 
-/// Whether a motion from one clearance to another, both in sums of radii, is one that overlaps too much. What approaches by next to nothing (the
-/// contact solve leaves that much) may go on up to [`DEEPEST`]: many short substeps would add up.
-pub(crate) fn overlaps(before: f64, now: f64) -> bool {
-    let room = ((DEEPEST + now) / (DEEPEST - OVERLAP)).clamp(0.0, 1.0);
-    now < -OVERLAP && now < before - (1e-6 + 2e-4 * room)
+/// Overlap, force or not, that no approach may go beyond: centerlines stay farther apart than [`PASS`], and out of shapes.
+const LIMIT: f64 = 0.35;
+
+/// Whether a motion from one clearance to another, both in sums of radii, is one that overlaps too much, beyond the depth to which the contact's own
+/// force presses. What approaches by next to nothing (the contact solve leaves that much) may go on up to [`DEEPEST`]: many short substeps would add up.
+pub(crate) fn overlaps(before: f64, now: f64, pressed: f64) -> bool {
+    let pressed = pressed.min(LIMIT - DEEPEST);
+    let room = ((DEEPEST + pressed + now) / (DEEPEST - OVERLAP)).clamp(0.0, 1.0);
+    now < -OVERLAP - pressed && now < before - (1e-6 + 2e-4 * room)
 }
 
 /// Distance of centerlines, in sums of radii, that no motion may go below on its way.
 pub(crate) const PASS: f64 = 0.3;
+
+/// The same of a centerline from a shape, in radii. A thread may be pressed to 0.3 (see `LIMIT`).
+pub(crate) const PASS_SHAPE: f64 = 0.2;
 
 /// Distance kept between centerlines beyond the sum of radii, in sums of radii; half of the overlap tolerance in reserve.
 pub(crate) const KEEP: f64 = 0.02;
@@ -186,8 +194,16 @@ pub(crate) const PRUNE: f64 = 0.5;
 pub(crate) const PARALLEL: f64 = 0.914;
 /// How much farther apart than their closest places two pieces may be where they are still taken to touch, in radii.
 pub(crate) const SAME_PLACE: f64 = 1e-3;
+/// Rows that one element may have on one shape between its particles.
+pub(crate) const PLACES: usize = 4;
+/// How near to each other along the thread two places over edges count as one, in radii.
+pub(crate) const SAME_EDGE: f64 = 0.3;
+/// How far from a row along the thread another one is set up within a substep, in radii.
+pub(crate) const SAME_ROW: f64 = 0.1;
 /// Part of an old overlap that may remain after a substep.
 pub(crate) const RECOVER: f64 = 0.8;
+/// Part of the depth to which its force presses a contact that it may lie deeper, to count half as one that overlaps.
+pub(crate) const UNEXPLAINED: f64 = 0.2;
 /// Residual of the contact solve, in radii. A light contact with a shape lies some 1e-4 radii deep: what leaves more does not find its force.
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-5;
 /// What a contact force in a rod's matrix may be off, over the largest of a shape on the same rod.

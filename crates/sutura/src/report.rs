@@ -40,6 +40,43 @@ pub struct Incident {
     pub kind: IncidentKind,
 }
 
+/// Why an attempt at a substep is rejected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Rejection {
+    /// A number of the solution was not finite.
+    NotFinite,
+    /// Newton's iteration did not converge.
+    NotConverged,
+    /// Its solution would take more work than a substep may.
+    TooMuchWork,
+    /// An inextensible thread cannot keep its length.
+    LengthNotKept,
+    /// Two pieces of thread overlap by more than the force between them presses them into each other.
+    ThreadOverlap,
+    /// Two pieces of thread would pass through each other.
+    ThreadPassage,
+    /// A thread overlaps a shape by more than the force between them presses it in.
+    ShapeOverlap,
+    /// A thread would pass through a shape.
+    ShapePassage,
+}
+
+impl core::fmt::Display for Rejection {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Rejection::NotFinite => "not finite",
+            Rejection::NotConverged => "not converged",
+            Rejection::TooMuchWork => "more work than a substep may take",
+            Rejection::LengthNotKept => "an inextensible thread cannot keep its length",
+            Rejection::ThreadOverlap => "threads overlap",
+            Rejection::ThreadPassage => "threads would pass through each other",
+            Rejection::ShapeOverlap => "a thread overlaps a shape",
+            Rejection::ShapePassage => "a thread would pass through a shape",
+        })
+    }
+}
+
 /// Kinds of incident.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -50,7 +87,14 @@ pub enum IncidentKind {
     /// simulated. What it would have crossed or failed to converge on is said.
     Stuck {
         /// Why the last attempt was rejected.
-        reason: &'static str,
+        reason: Rejection,
+    },
+    /// After all halvings no acceptable substep was found for these threads: they stay where they were for the rest of the step, everything else goes on.
+    Held {
+        /// Why the last attempt was rejected.
+        reason: Rejection,
+        /// The threads (twice the same one, where it was alone).
+        rods: [Handle<Rod>; 2],
     },
     /// A substep was accepted without convergence to the tolerance.
     NotConverged {
@@ -92,6 +136,7 @@ impl core::fmt::Display for IncidentKind {
         match self {
             IncidentKind::NotFinite => write!(f, "a number was not finite; the substep was rolled back"),
             IncidentKind::Stuck { reason } => write!(f, "no acceptable substep was found ({reason}); stayed at the last good state"),
+            IncidentKind::Held { reason, .. } => write!(f, "no acceptable motion of a thread was found ({reason}); it stayed where it was, the rest went on"),
             IncidentKind::NotConverged { residual } => write!(f, "accepted without convergence: last move {residual:.2e} radii"),
             IncidentKind::LengthNotKept { elongation, .. } => {
                 write!(f, "no motion keeps an inextensible thread at its length (off by {:.3} %); it stretched as its material does", 100.0 * elongation)

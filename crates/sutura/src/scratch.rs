@@ -114,6 +114,9 @@ pub(crate) struct Scratch {
 
     /// Work of the substep so far, in rough counts of multiplications: counted, not timed.
     pub work: f64,
+    /// Rods that the last attempt was refused for, and rods that are held where they were, from when, for the rest of the step.
+    pub refused: Option<[u32; 2]>,
+    pub held: Vec<(u32, f64)>,
     pub candidates: Candidates,
     pub rows: Rows,
     /// Of the paper's solver.

@@ -11,7 +11,7 @@ use crate::newton;
 use crate::params::{Integrator, Solver};
 use crate::pbd;
 use crate::reel;
-use crate::report::{Incident, IncidentKind, StepReport};
+use crate::report::{Incident, IncidentKind, Rejection, StepReport};
 use crate::rod::strain;
 use crate::row;
 use crate::scratch::{ClampJoint, Freedom, Scratch};
@@ -38,6 +38,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
     let h = interval.length / n;
     report.converged = true;
+    scratch.held.clear();
     state.time = interval.start;
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
@@ -54,19 +55,11 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     // Where nothing acceptable was found, what is driven stays with the rest.
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
-        grip.pose = grip.pose.interpolate(&grip.target, reached);
+        let held = scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
+        grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
     }
     state.time = interval.start + interval.length;
 }
-
-/// Why a substep is rejected whose numbers are not finite.
-const NOT_FINITE: &str = "not finite";
-
-/// Why one is in which inextensible threads cannot keep their length.
-const INFEASIBLE: &str = "an inextensible thread cannot keep its length";
-
-/// Why one is that would not come to an end.
-const TOO_MUCH: &str = "more work than a substep may take";
 
 /// Halvings after which threads that do not stretch are let stretch, if there is still no acceptable substep.
 const GIVE_WAY: u32 = 4;
@@ -139,7 +132,7 @@ fn advance(
             let off = !newton::keeps_lengths(model, &from.position) && !newton::keeps_lengths(model, &state.position);
             let least = if last || depth >= GIVE_WAY {
                 Some(0.0)
-            } else if reason == INFEASIBLE {
+            } else if reason == Rejection::LengthNotKept {
                 Some(newton::LENGTH_FLOOR)
             } else {
                 off.then_some(newton::LENGTH_TOLERANCE)
@@ -156,7 +149,13 @@ fn advance(
                 return advance(model, state, scratch, interval, t, half, depth + 1, report)
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
             }
-            let kind = if reason == NOT_FINITE { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
+            if let Some(rods) = hold_refused(model, scratch, t) {
+                report.incidents.push(Incident { time: t, kind: IncidentKind::Held { reason, rods: rods.map(|r| model.rods.handle(r)) } });
+                report.converged = false;
+                (state.last_h, state.calm) = (0.0, 0);
+                return advance(model, state, scratch, interval, t, h, depth, report);
+            }
+            let kind = if reason == Rejection::NotFinite { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
             report.incidents.push(Incident { time: t, kind });
             report.converged = false;
             state.last_h = 0.0;
@@ -167,6 +166,22 @@ fn advance(
             false
         }
     }
+}
+
+/// Holds the rods for which the last attempt was refused where they are, for the rest of the step; which ones. None when that is no help: they are held already,
+/// or nothing else is there to go on. (What threads share at a weld, and reels, would need more: then all stops.)
+fn hold_refused(model: &Model, scratch: &mut Scratch, t: f64) -> Option<[u32; 2]> {
+    let rods = scratch.refused.take()?;
+    if model.welds.len() > 0 || !scratch.brakes.is_empty() {
+        return None;
+    }
+    let before = scratch.held.len();
+    for rod in rods {
+        if scratch.held.iter().all(|(r, _)| *r != rod) {
+            scratch.held.push((rod, t));
+        }
+    }
+    (scratch.held.len() > before && scratch.held.len() < scratch.rods.len()).then_some(rods)
 }
 
 /// Inextensible threads that are off their length by the `least` elongation or more in a state that was tried stretch as their material does, as a thread does
@@ -233,7 +248,7 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
 /// What a substep came to.
 struct Attempt {
     outcome: newton::Outcome,
-    verdict: Result<Clearance, &'static str>,
+    verdict: Result<Clearance, Rejection>,
     /// Whether it was of second order although contacts changed in it.
     touches_anew: bool,
 }
@@ -257,25 +272,30 @@ fn solve(
         collide::detect(model, state, scratch);
         row::thread::begin(model, state, scratch);
         row::shape::begin(model, state, scratch, stage.length());
+        scratch.refused = None;
         let outcome = newton::solve(model, state, scratch, stage.span);
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
-            Err(NOT_FINITE)
+            Err(Rejection::NotFinite)
         } else if outcome.infeasible || !outcome.converged && depth == model.settings.halvings && !newton::keeps_lengths(model, &state.position) {
-            Err(INFEASIBLE)
+            Err(Rejection::LengthNotKept)
         } else if !outcome.converged && scratch.exhausted() {
-            Err(TOO_MUCH)
+            Err(Rejection::TooMuchWork)
         } else if !outcome.converged && depth < model.settings.halvings {
-            Err("not converged")
+            Err(Rejection::NotConverged)
         } else {
-            collide::sweep(model, state, scratch)
+            let pressed = collide::Pressed { threads: row::pressed_threads, shape: row::pressed_shape };
+            collide::sweep(model, state, scratch, pressed).map_err(|refused| {
+                scratch.refused = Some(refused.rods);
+                refused.reason
+            })
         };
         let mut touches = false;
         let verdict = verdict.and_then(|clearance| {
             reel::pay_out(model, state, &scratch.brakes);
             accept(model, state, scratch, &stage, h);
             let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
-            if clear && all_finite(model, state) { Ok(clearance) } else { Err(NOT_FINITE) }
+            if clear && all_finite(model, state) { Ok(clearance) } else { Err(Rejection::NotFinite) }
         });
         if verdict.is_ok() {
             touches = method != Method::Euler && touches_anew(&scratch.saved[depth as usize], state);
@@ -374,8 +394,18 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
     let saved = core::mem::take(&mut scratch.saved);
     let origin = &saved[depth as usize];
     integrator::carry(model, state, scratch, origin, stage, h);
+    for (slot, _) in &scratch.held {
+        let rod = model.rods.at(*slot).expect("rods live through a step");
+        for i in rod.particles() {
+            (state.position[i], state.orientation[i]) = (scratch.start[i], scratch.start_frame[i]);
+            (scratch.freedom[2 * i], scratch.freedom[2 * i + 1]) = (Freedom::Held, Freedom::Held);
+        }
+    }
     let t = began + stage.end;
     for (slot, grip) in state.grips.iter() {
+        if scratch.held.iter().any(|(rod, _)| *rod == grip.rod) {
+            continue;
+        }
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
         let first = rod.first as usize;
         let pose = grip_pose(grip, interval, t);

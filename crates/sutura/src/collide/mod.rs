@@ -7,8 +7,10 @@ mod tree;
 pub(crate) use shape::{Collider, Distance};
 
 use crate::model::Model;
+use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
 use crate::params;
+use crate::report::Rejection;
 use crate::rod::lanes::Vec2;
 use crate::scratch::Scratch;
 use crate::state::State;
@@ -24,6 +26,8 @@ pub(crate) struct Candidates {
     pub threads: Vec<(u32, u32)>,
     /// Shape slot and element.
     pub shapes: Vec<(u32, u32)>,
+    /// Boxes of the living shapes, all the way from the start of the substep to the iterate, in the order of their slots.
+    shape_bounds: Vec<(DVec3, DVec3)>,
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
     tree: Tree,
@@ -124,8 +128,8 @@ fn arcs(model: &Model, arc: &mut Vec<f64>) {
 /// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
 /// room for what Newton will add.
 pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { candidates, start, radius, .. } = scratch;
-    let Candidates { threads, shapes, arc, tree, turned, straight } = candidates;
+    let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
+    let Candidates { threads, shapes, shape_bounds, arc, tree, turned, straight } = candidates;
     let n = model.mass.len();
     arcs(model, arc);
     turning(model, [start, &state.position], turned);
@@ -154,8 +158,11 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
     });
     threads.sort_unstable();
     shapes.clear();
+    shape_bounds.clear();
     for (slot, shape) in model.shapes.iter() {
-        let (lo, hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
+        let k = slot as usize;
+        let (lo, hi) = shape.collider.swept_bounds(&start_shape_pose[k], &state.shape_pose[k]);
+        shape_bounds.push((lo, hi));
         // A plane's box is everything: it overlaps the empty leaves as well.
         tree.overlapping(&Bounds { lo, hi }, |e| {
             if e < model.mass.len() && model.is_element(e) {
@@ -166,14 +173,28 @@ pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
     shapes.sort_unstable();
 }
 
+/// Why a motion is refused, and because of which rods.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Refused {
+    pub reason: Rejection,
+    pub rods: [u32; 2],
+}
+
+/// What [`sweep`] asks of the rows.
+#[derive(Clone, Copy)]
+pub(crate) struct Pressed {
+    pub threads: fn(&Scratch, usize, usize) -> f64,
+    pub shape: fn(&Scratch, u32, usize) -> f64,
+}
+
 /// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and still approach,
-/// nothing may have passed through.
-pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Result<Clearance, &'static str> {
+/// nothing may have passed through. `pressed` says how deep the forces near two elements, and near an element and a shape, press them into each other \[m\].
+pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed: Pressed) -> Result<Clearance, Refused> {
     if outran(model, state, scratch) {
         detect(model, state, scratch);
     }
     let mut clearance = Clearance::default();
-    let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
+    let Scratch { candidates, start, start_shape_pose, radius, .. } = &*scratch;
     let x = &state.position;
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
@@ -192,11 +213,11 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
             continue;
         }
         let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]).apart.length();
-        if params::overlaps((before - sum) / sum, gap) {
-            return Err("threads overlap");
+        if gap < -params::OVERLAP && params::overlaps((before - sum) / sum, gap, (pressed.threads)(scratch, a, b) / sum) {
+            return Err(Refused { reason: Rejection::ThreadOverlap, rods: [model.rod_of[a], model.rod_of[b]] });
         }
         if before - moved < params::PASS * sum && passes(start, x, a, b, params::PASS * sum.min(before)) {
-            return Err("threads would pass through each other");
+            return Err(Refused { reason: Rejection::ThreadPassage, rods: [model.rod_of[a], model.rod_of[b]] });
         }
     }
     // Neighboring elements share a particle.
@@ -204,59 +225,49 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch) -> Resu
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
+        let collider = &shape.collider;
         let r = radius[e];
-        let mut found = [last.filter(|(at, _)| *at == (*slot, e)).map(|(_, seen)| seen), None, None];
-        // The ends and the middle, then, where the surface may come nearer between these (an edge across the element), the nearest place.
-        for look in 0..4 {
-            let s = if let [Some(first), Some(middle), Some(end)] = found {
-                let along = x[e + 1] - x[e];
-                match shape.collider.nearest_between([first, middle, end], &state.shape_pose[k], [x[e], x[e + 1]], along, r * (1.0 - 2.0 * params::OVERLAP)) {
-                    Some(s) => s,
-                    None => break,
-                }
-            } else if found[look.min(2)].is_some() {
-                continue;
-            } else {
-                0.5 * look as f64
-            };
-            let at = |x: &[DVec3]| match s {
-                0.0 => x[e],
-                0.5 => (x[e] + x[e + 1]) * 0.5,
-                1.0 => x[e + 1],
-                s => x[e].lerp(x[e + 1], s),
-            };
-            let before = || shape.collider.distance(&start_shape_pose[k], at(start), None);
-            let side = shape.collider.has_sides().then(|| before().normal);
-            let now = shape.collider.distance(&state.shape_pose[k], at(x), side);
-            if look < 3 {
-                found[look] = Some(now);
-            }
-            let gap = (now.value - r) / (2.0 * r);
+        let refused = |reason| Refused { reason, rods: [model.rod_of[e]; 2] };
+        let (start_pose, pose) = (&start_shape_pose[k], &state.shape_pose[k]);
+        let from = [start[e], start[e + 1]].map(|p| start_pose.inverse_transform_point(p));
+        let to = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
+        let first = last.filter(|(at, _)| *at == (*slot, e)).map_or_else(|| collider.distance_local(to[0]), |(_, seen)| seen);
+        let second = collider.distance_local(to[1]);
+        last = Some(((*slot, e + 1), second));
+        let mut judge = |s: f64, value: f64| {
+            let gap = (value - r) / (2.0 * r);
             clearance.shape = Some(clearance.shape.map_or(gap, |c| c.min(gap)));
-            if gap < -params::OVERLAP && params::overlaps((before().value - r) / (2.0 * r), gap) {
-                return Err("a thread overlaps a shape");
+            if gap >= -params::OVERLAP {
+                return Ok(());
             }
-            // A thin shape can be jumped over: look along the way.
-            let way = (at(x) - at(start)).length();
-            if way > r {
-                let before = before();
-                let steps = (2.0 * way / r).ceil().min(200.0);
-                for j in 1..steps as u32 {
-                    let u = f64::from(j) / steps;
-                    let pose = start_shape_pose[k].interpolate(&state.shape_pose[k], u);
-                    let between = shape.collider.distance(&pose, at(start).lerp(at(x), u), Some(before.normal));
-                    if between.value < 0.5 * r && between.value < before.value {
-                        return Err("a thread would pass through a shape");
-                    }
+            let before = collider.distance_local(from[0].lerp(from[1], s)).value;
+            let pressed = (pressed.shape)(scratch, *slot, e) / (2.0 * r);
+            if params::overlaps((before - r) / (2.0 * r), gap, pressed) { Err(refused(Rejection::ShapeOverlap)) } else { Ok(()) }
+        };
+        judge(0.0, first.value)?;
+        judge(1.0, second.value)?;
+        // A distance grows no faster than the way.
+        let below = r * (1.0 - 2.0 * params::OVERLAP);
+        if first.value.min(second.value) - 0.5 * (to[1] - to[0]).length() < below {
+            let mut verdict = Ok(());
+            collider.least_between(to, below, |s, d| {
+                if verdict.is_ok() {
+                    verdict = judge(s, d.value);
                 }
-            }
+            });
+            verdict?;
         }
-        last = found[2].map(|end| ((*slot, e + 1), end));
+        // Seen from the shape, whichever of the two moves.
+        let moved = (to[0] - from[0]).length().max((to[1] - from[1]).length());
+        let near = first.value.min(second.value) - 0.5 * (to[1] - to[0]).length() - moved;
+        if near < params::PASS_SHAPE * r && moved > 0.5 * params::PASS_SHAPE * r && passes_shape(collider, from, to, moved, params::PASS_SHAPE * r) {
+            return Err(refused(Rejection::ShapePassage));
+        }
     }
     Ok(clearance)
 }
 
-/// Whether the iterate left the boxes in which candidates were sought, or bent a piece that was taken as straight.
+/// Whether the iterate, or a shape that is pushed, left the boxes in which candidates were sought, or bent a piece that was taken as straight.
 fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { candidates, radius, .. } = scratch;
     let x = &state.position;
@@ -266,7 +277,11 @@ fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
         let (lo, hi) = (b.lo + keep, b.hi - keep);
         x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
     });
-    left || {
+    let pushed = model.shapes.iter().zip(&candidates.shape_bounds).filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. })).any(|((slot, shape), (lo, hi))| {
+        let (now_lo, now_hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
+        now_lo.cmplt(*lo).any() || now_hi.cmpgt(*hi).any()
+    });
+    left || pushed || {
         // Both lanes the same: there is one centerline to look at.
         turning(model, [x, x], &mut candidates.turned);
         let end = &candidates.turned;
@@ -301,6 +316,31 @@ fn passes(from: &[DVec3], to: &[DVec3], a: usize, b: usize, least: f64) -> bool 
     true
 }
 
+/// The same for an element and a shape, both ends given in the frame of the shape.
+fn passes_shape(collider: &Collider, from: [DVec3; 2], to: [DVec3; 2], moved: f64, least: f64) -> bool {
+    // Nothing is nearer than where it came from and where it went to, less half of the way.
+    let Some((_, before)) = collider.segment_distance(from, least + moved) else { return false };
+    // From an overlap any way out is good.
+    let least = least.min(0.9 * before);
+    if least <= 0.0 {
+        return collider.segment_distance(to, before.min(0.0)).is_some();
+    }
+    let mut u = 0.0;
+    for _ in 0..200 {
+        let at = [0, 1].map(|k| from[k].lerp(to[k], u));
+        match collider.segment_distance(at, least + moved * (1.0 - u)) {
+            // The rest of the way is too short.
+            None => return false,
+            Some((_, d)) if d < least => return true,
+            Some((_, d)) => u += ((d - 0.9 * least) / moved).max(1e-3),
+        }
+        if u >= 1.0 {
+            return false;
+        }
+    }
+    true
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,12 +363,12 @@ mod tests {
         let (model, mut state, mut scratch, r) = straight_thread();
         detect(&model, &state, &mut scratch);
         assert!(scratch.candidates.threads.is_empty());
-        assert!(sweep(&model, &state, &mut scratch).is_ok());
+        assert!(sweep(&model, &state, &mut scratch, Pressed { threads: |_, _, _| 0.0, shape: |_, _, _| 0.0 }).is_ok());
         // The second half back along the first, one radius beside it.
         for i in 51..=100 {
             state.position[i] = state.position[100 - i] + DVec3::Y * r;
         }
-        assert!(sweep(&model, &state, &mut scratch).is_err());
+        assert!(sweep(&model, &state, &mut scratch, Pressed { threads: |_, _, _| 0.0, shape: |_, _, _| 0.0 }).is_err());
     }
 
     #[test]

@@ -56,6 +56,15 @@ impl Material {
         }
     }
 
+    /// Plane-strain modulus of Hertz contact, E / (1 - nu^2) \[Pa\]. Where the shear modulus is given, which of a braid says nothing about nu, nu is 0.4.
+    pub(crate) fn contact_modulus(&self) -> f64 {
+        let nu = match self.shear {
+            Shear::Poisson(nu) => nu,
+            Shear::Modulus(_) => 0.4,
+        };
+        self.young_modulus / (1.0 - nu * nu)
+    }
+
     pub(crate) fn validate(&self) -> Result<(), Error> {
         let what = "material";
         check(what, "young_modulus", self.young_modulus, self.young_modulus > 0.0, "a finite number > 0 [Pa]")?;

@@ -174,10 +174,6 @@ impl RodModel {
     pub fn elements(&self) -> core::ops::Range<usize> {
         self.first as usize..(self.first + self.n_elements) as usize
     }
-    /// Radius-scaled normal stiffness of its surface \[N/m\].
-    pub fn contact_stiffness(&self) -> f64 {
-        crate::params::CONTACT_STIFFNESS * self.material.young_modulus * self.radius
-    }
 }
 
 /// Sections of the elements of a rod, checked. Each element is given by its factors and its rest length \[m\].

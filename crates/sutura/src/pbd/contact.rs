@@ -260,7 +260,7 @@ fn meet_shape(shape: &Collider, [from, to]: [DVec3; 2], radius: f64) -> Option<(
     let mut t = 0.0;
     for _ in 0..STEPS {
         let at = from.lerp(to, t);
-        let d = shape.distance(&Pose::IDENTITY, at, None);
+        let d = shape.distance_local(at);
         let gap = d.value - radius;
         if gap <= NEAR * radius {
             return Some((at - d.normal * d.value, d.normal));
@@ -272,7 +272,7 @@ fn meet_shape(shape: &Collider, [from, to]: [DVec3; 2], radius: f64) -> Option<(
     }
     // It passes by closely: the last place will do.
     let at = from.lerp(to, t);
-    let d = shape.distance(&Pose::IDENTITY, at, None);
+    let d = shape.distance_local(at);
     Some((at - d.normal * d.value, d.normal))
 }
 

@@ -72,7 +72,8 @@ pub(crate) struct Entry {
     /// Gap, and slip still to undo, that the step without contact forces would leave \[m\].
     pub free: DVec3,
     pub mu: f64,
-    pub compliance: f64,
+    /// Of the contact itself along the three axes \[m/N\].
+    pub compliance: DVec3,
     pub radius: f64,
     /// Force along the axes \[N\].
     pub force: DVec3,
@@ -110,6 +111,18 @@ pub(crate) struct Coupling {
     small: Vec<f64>,
     /// Residual of the last solution, in radii.
     left: f64,
+}
+
+/// Gap that a row may keep, and its compliance, so that overlap from before is won back over a few substeps. `depth` is to what the force at the start presses, by
+/// a law of `compliance` now. A row that lay deeper, by `-start_gap`, ends at `RECOVER * old + (1 - RECOVER) * depth`, never deeper than the larger of the two
+/// (what is deeper than its force explains must be able to bear more force without going deeper). What lies only a little deeper is between that and the law itself.
+pub(crate) fn regain(start_gap: f64, depth: f64, compliance: f64) -> (f64, f64) {
+    let excess = -start_gap - depth;
+    if excess <= 0.0 {
+        return (0.0, compliance);
+    }
+    let part = params::RECOVER * (excess / (excess + params::UNEXPLAINED * depth));
+    (part * start_gap, (1.0 - part) * compliance)
 }
 
 /// Forgets the contacts of the last substep.
@@ -220,8 +233,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     let mut smallest = f64::INFINITY;
     for (k, entry) in entries.iter().enumerate() {
         smallest = smallest.min(entry.radius);
-        for i in 3 * k..3 * k + 3 {
-            s[i * n + i] += entry.compliance;
+        for (axis, i) in (3 * k..3 * k + 3).enumerate() {
+            s[i * n + i] += entry.compliance[axis];
             for j in 0..i {
                 s[i * n + j] = s[j * n + i];
             }

@@ -11,6 +11,7 @@ pub(crate) mod thread;
 pub(crate) mod weld;
 
 use crate::math::Pose;
+use crate::scratch::Scratch;
 use glam::{DQuat, DVec3};
 
 /// Where things were at the start of the substep.
@@ -30,10 +31,26 @@ pub(crate) struct Rows {
     pub border: border::Border,
     pub solver: couple::Coupling,
     fresh: Vec<thread::ThreadRow>,
+    fresh_shapes: Vec<shape::ShapeRow>,
 }
 
 impl Rows {
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty() && self.threads.is_empty()
     }
+}
+
+/// How deep the contact forces at two elements or their neighbors press them into each other \[m\].
+pub(crate) fn pressed_threads(scratch: &Scratch, a: usize, b: usize) -> f64 {
+    let near = |r: &&thread::ThreadRow| {
+        let [c, d] = r.elements();
+        c.abs_diff(a) <= 1 && d.abs_diff(b) <= 1
+    };
+    scratch.rows.threads.iter().filter(near).map(thread::ThreadRow::depth).fold(0.0, f64::max)
+}
+
+/// How deep the contact forces at an element or its neighbors press it into a shape \[m\].
+pub(crate) fn pressed_shape(scratch: &Scratch, shape: u32, element: usize) -> f64 {
+    let near = |r: &&shape::ShapeRow| r.on().0 == shape && r.on().1.abs_diff(element) <= 1;
+    scratch.rows.shapes.iter().filter(near).map(shape::ShapeRow::depth).fold(0.0, f64::max)
 }

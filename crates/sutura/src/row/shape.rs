@@ -21,12 +21,12 @@
 
 use crate::collide::Distance;
 use crate::math::{Pose, log, outer, skew};
-use crate::model::Model;
 use crate::model::shape::ShapeMotion;
+use crate::model::{Model, ShapeModel};
 use crate::params;
 use crate::row::Start;
 use crate::row::border::Border;
-use crate::row::couple::{Endpoint, Entry, Source};
+use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::row::pushed::Sliders;
 use crate::scratch::Scratch;
 use crate::state::{ShapeContact, State};
@@ -42,8 +42,9 @@ pub(crate) struct ShapeRow {
     /// Normal force over gap squared \[N/m^2\], and normal stiffness at the last look \[N/m\].
     hardness: f64,
     stiffness: f64,
-    /// Friction coefficient: the kinetic one if it slid in the last substep.
-    mu: f64,
+    /// Friction coefficients: the kinetic one holds if it slid in the last substep.
+    mu: [f64; 2],
+    sliding: bool,
     /// Least normal force of a firm row \[N\].
     least: f64,
     /// In the rods' matrix, not in the small problem.
@@ -55,11 +56,14 @@ pub(crate) struct ShapeRow {
     drift: DVec3,
     /// Compliance with which it last entered the small problem \[m/N\].
     entered: f64,
-    /// Direction of the thread.
+    /// Direction of the element, and, between its particles, that of the thread as a smooth curve.
     along: DVec3,
+    smooth: Option<DVec3>,
     /// Outward direction of the surface and gap at the last look.
     normal: DVec3,
     gap: f64,
+    /// Distance from the surface at the start.
+    before: Distance,
     /// Gap at the start, and where the velocity of the thread and the shape's drive would lead.
     start_gap: f64,
     next_gap: f64,
@@ -86,10 +90,49 @@ enum Mode {
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
 
+/// How much nearer than its ends a place within an element is that has a row of its own, in radii; and over an edge sharper than the thread.
+const BULGE: f64 = 0.08;
+const SHARP_BULGE: f64 = 0.004;
+
 impl ShapeRow {
     /// Its element, when it may enter the small problem.
     pub fn entering(&self) -> Option<usize> {
         (!self.firm).then_some(self.element as usize)
+    }
+
+    pub fn on(&self) -> (u32, usize) {
+        (self.shape, self.element as usize)
+    }
+
+    /// How deep its force presses the thread into the shape \[m\].
+    pub fn depth(&self) -> f64 {
+        (self.normal_force.max(0.0) / self.hardness).sqrt()
+    }
+
+    fn mu(&self) -> f64 {
+        self.mu[usize::from(self.sliding)]
+    }
+
+    /// Place along all threads, in elements.
+    fn place(&self) -> f64 {
+        f64::from(self.element) + self.s
+    }
+
+    fn key(&self) -> (u32, f64) {
+        (self.shape, self.place())
+    }
+
+    /// Takes over an old contact.
+    fn receive(&mut self, c: &ShapeContact) {
+        let across = |v: DVec3| v - self.normal * self.normal.dot(v);
+        self.sliding |= c.sliding;
+        self.drift = across(c.drift);
+        self.carried += c.normal_force;
+        self.normal_force = self.carried;
+        self.anchor += across(c.friction);
+        self.friction = self.anchor;
+        self.firm = self.carried > self.least;
+        self.mode = Some(self.friction).filter(|_| self.sliding).and_then(DVec3::try_normalize).map_or(Mode::Sticks, Mode::Slides);
     }
 
     /// Normal and two tangents.
@@ -112,32 +155,114 @@ impl ShapeRow {
     }
 }
 
-/// Collects the rows of the substep.
+/// What the rows of one element on one shape have in common.
+struct Site<'a> {
+    model: &'a Model,
+    slot: u32,
+    element: usize,
+    /// Way of a pushed shape that nothing resists.
+    pushed: DVec3,
+    start: &'a [DVec3],
+    start_pose: &'a Pose,
+    now: &'a [DVec3],
+    pose: &'a Pose,
+}
+
+impl Site<'_> {
+    fn shape(&self) -> &ShapeModel {
+        self.model.shapes.at(self.slot).expect("candidate shapes live")
+    }
+
+    /// Distances of a place at the start and where velocity leads, in the direction of the first.
+    fn look(&self, s: f64) -> (Distance, Distance) {
+        let e = self.element;
+        let at = |x: &[DVec3]| {
+            if s == 0.0 {
+                x[e]
+            } else if s == 1.0 {
+                x[e + 1]
+            } else {
+                x[e].lerp(x[e + 1], s)
+            }
+        };
+        let before = self.shape().collider.distance(self.start_pose, at(self.start));
+        (before, self.shape().collider.follow((self.start_pose, at(self.start), before), (self.pose, at(self.now)), before.normal))
+    }
+
+    /// Direction of the thread at a place within the element, which turns evenly from the middle of one element to that of the next.
+    fn smooth_direction(&self, s: f64) -> DVec3 {
+        let (e, x) = (self.element, self.start);
+        let of = |e: usize| (x[e + 1] - x[e]).normalize_or_zero();
+        let own = of(e);
+        let (at_joint, part) = if s > 0.5 {
+            (if self.model.is_element(e + 1) { own + of(e + 1) } else { own }, 2.0 * s - 1.0)
+        } else {
+            (if e > 0 && self.model.is_element(e - 1) { own + of(e - 1) } else { own }, 1.0 - 2.0 * s)
+        };
+        own.lerp(at_joint.normalize_or(own), part).normalize_or(own)
+    }
+
+    fn row(&self, s: f64, before: Distance, now: Distance) -> ShapeRow {
+        let e = self.element;
+        let rod = self.model.rods.at(self.model.rod_of[e]).expect("element of a living rod");
+        let friction = self.model.friction_between(rod.surface, self.shape().surface);
+        let gap = before.value - rod.radius * (1.0 + 2.0 * params::KEEP);
+        let smooth = (s > 0.0 && s < 1.0).then(|| self.smooth_direction(s));
+        ShapeRow {
+            shape: self.slot,
+            element: e as u32,
+            s,
+            radius: rod.radius,
+            hardness: HARDNESS * rod.material.young_modulus,
+            stiffness: 0.0,
+            least: params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
+            mu: [friction.stick, friction.slide],
+            sliding: false,
+            firm: false,
+            wanted: false,
+            anchor: DVec3::ZERO,
+            drift: DVec3::ZERO,
+            entered: 0.0,
+            along: (self.start[e + 1] - self.start[e]).normalize_or_zero(),
+            smooth,
+            normal: across(before.normal, smooth),
+            gap,
+            before,
+            start_gap: gap,
+            next_gap: gap + now.value - before.value - before.normal.dot(self.pushed),
+            carried: 0.0,
+            normal_force: 0.0,
+            friction: DVec3::ZERO,
+            mode: Mode::Sticks,
+            pressed: 0.0,
+            tangent: DMat3::ZERO,
+            expected: DVec3::ZERO,
+        }
+    }
+}
+
+/// Collects the rows of the substep and gives them the forces of the last one.
 pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
-    rows.shapes.clear();
-    rows.sliders.begin(model, h);
-    let old = &state.shape_contacts;
+    let (rows, sliders) = (&mut rows.shapes, &mut rows.sliders);
+    rows.clear();
+    sliders.begin(model, h);
+    let x = &state.position;
     let mut last = None;
     for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let shape = model.shapes.at(*slot).expect("candidate shapes live");
-        let rod = model.rods.at(model.rod_of[e]).expect("element of a living rod");
-        let friction = model.friction_between(rod.surface, shape.surface);
-        let pose = &state.shape_pose[k];
+        let radius = model.rods.at(model.rod_of[e]).expect("element of a living rod").radius;
         let pushed = match shape.motion {
             ShapeMotion::Pushed { direction, force, speed_limit } if force > 0.0 => direction * (speed_limit * h),
             _ => DVec3::ZERO,
         };
-        let reach = rod.radius * (1.0 + params::REACH);
-        let x = &state.position;
-        let look = |i: usize| {
-            let before = shape.collider.distance(&start_shape_pose[k], start[i], None);
-            (before, shape.collider.distance(pose, x[i], Some(before.normal)))
-        };
+        let (start_pose, pose) = (&start_shape_pose[k], &state.shape_pose[k]);
+        let site = Site { model, slot: *slot, element: e, pushed, start, start_pose, now: x, pose };
+        let reach = radius * (1.0 + params::REACH);
         // Neighboring elements share a particle.
-        let first = last.take().filter(|(at, _)| *at == (*slot, e)).map_or_else(|| look(e), |(_, seen)| seen);
-        let second = look(e + 1);
+        let first = last.take().filter(|(at, _)| *at == (*slot, e)).map_or_else(|| site.look(0.0), |(_, seen)| seen);
+        let second = site.look(1.0);
         last = Some(((*slot, e + 1), second));
         let nearer = |(before, now): (Distance, Distance)| before.value.min(now.value);
         let (d0, d1) = (nearer(first), nearer(second));
@@ -146,65 +271,106 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
             continue;
         }
         let mut add = |s: f64, before: Distance, now: Distance| {
-            // Old contacts are sorted; those of this element on this shape are a few entries.
-            let from = old.partition_point(|c| (c.shape, c.element) < (*slot, e as u32));
-            let known = old[from..]
-                .iter()
-                .take_while(|c| (c.shape, c.element) == (*slot, e as u32))
-                .filter(|c| (c.s - s).abs() < 0.3)
-                .min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()))
-                // The half of a post that it touches now may be the other one.
-                .or_else(|| old.iter().find(|c| c.element == e as u32 && c.s == s && c.shape != *slot && c.normal.dot(before.normal) > 0.9999));
-            if now.value.min(before.value) > reach {
-                return;
+            if before.value.min(now.value) <= reach {
+                rows.push(site.row(s, before, now));
             }
-            // A surface is left on the side where it was touched.
-            let side = if known.is_some_and(|c| c.normal.dot(before.normal) < 0.0) { -1.0 } else { 1.0 };
-            let normal = before.normal * side;
-            let across = |v: DVec3| v - normal * normal.dot(v);
-            let gap = before.value - rod.radius * (1.0 + 2.0 * params::KEEP);
-            let normal_force = known.map_or(0.0, |c| c.normal_force);
-            rows.shapes.push(ShapeRow {
-                shape: *slot,
-                element: e as u32,
-                s,
-                radius: rod.radius,
-                hardness: HARDNESS * rod.material.young_modulus,
-                stiffness: 0.0,
-                least: params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
-                mu: if known.is_some_and(|c| c.sliding) { friction.slide } else { friction.stick },
-                firm: normal_force > params::FIRM * rod.material.young_modulus * rod.radius * rod.radius,
-                wanted: false,
-                anchor: known.map_or(DVec3::ZERO, |c| across(c.friction)),
-                drift: known.map_or(DVec3::ZERO, |c| across(c.drift)),
-                entered: 0.0,
-                along: (start[e + 1] - start[e]).normalize_or_zero(),
-                normal,
-                gap,
-                start_gap: gap,
-                next_gap: gap + side * now.value - before.value - normal.dot(pushed),
-                carried: normal_force,
-                normal_force,
-                friction: known.map_or(DVec3::ZERO, |c| across(c.friction)),
-                mode: known.filter(|c| c.sliding).and_then(|c| across(c.friction).try_normalize()).map_or(Mode::Sticks, Mode::Slides),
-                pressed: 0.0,
-                tangent: DMat3::ZERO,
-                expected: DVec3::ZERO,
+        };
+        // At a particle, against all walls of a mesh that it may touch.
+        let mut at_particle = |i: usize, s: f64, seen: (Distance, Distance)| {
+            add(s, seen.0, seen.1);
+            let near = radius * (1.0 + params::MARGIN) + 1.5 * (x[i] - start[i]).length().min(4.0 * radius);
+            shape.collider.further_walls(start_pose, start[i], near, |before| {
+                add(s, before, shape.collider.follow((start_pose, start[i], before), (pose, x[i]), before.normal));
             });
         };
-        add(0.0, first.0, first.1);
-        // A row of its own only where the surface bulges toward the middle by more than may overlap. On a flatter one a chord would
-        // rock about it: the closest place runs along the element by (radius of the surface) x (tilt).
-        let below = d0.min(d1) - 0.08 * rod.radius;
-        if let Some(s) = shape.collider.nearest_on_segment(pose, x[e], x[e + 1], below).filter(|s| *s > 0.02 && *s < 0.98) {
-            let before = shape.collider.distance(&start_shape_pose[k], start[e].lerp(start[e + 1], s), None);
-            add(s, before, shape.collider.distance(pose, x[e].lerp(x[e + 1], s), Some(before.normal)));
-        }
+        at_particle(e, 0.0, first);
         if !model.is_element(e + 1) {
-            add(1.0, second.0, second.1);
+            at_particle(e + 1, 1.0, second);
+        }
+        let mut places = [0.0; params::PLACES];
+        let mut count = 0;
+        let mut between = |s: f64, value: f64| {
+            let apart = places[..count].iter().all(|p: &f64| (p - s).abs() * length > params::SAME_EDGE * radius);
+            if bulges([d0, d1], s, value, length, radius) && apart && count < places.len() {
+                places[count] = s;
+                count += 1;
+            }
+        };
+        let below = d0.min(d1) - SHARP_BULGE * radius;
+        for (pose, x) in [(pose, x.as_slice()), (start_pose, start.as_slice())] {
+            let local = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
+            shape.collider.least_between(local, below, |s, d| between(s, d.value));
+        }
+        for s in &places[..count] {
+            let (before, now) = site.look(*s);
+            add(*s, before, now);
         }
     }
-    merge(&mut rows.shapes);
+    rows.sort_unstable_by(|a, b| a.key().partial_cmp(&b.key()).expect("places are numbers"));
+    leave_to_edges(rows, start);
+    inherit(&state.shape_contacts, model, rows);
+    merge(rows);
+}
+
+/// Whether a place between two particles needs a row of its own: where the surface bulges toward the middle by more than may overlap. On a flatter one a chord would
+/// rock about the row: the closest place runs along the element by (radius of the surface) x (tilt). It does not about an edge sharper than the thread,
+/// which shows by how fast the distance grows.
+fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool {
+    let way = length * if ends[0] < ends[1] { s } else { 1.0 - s };
+    let bulge = ends[0].min(ends[1]) - value;
+    // The distance grows by way^2 / (2 (R + r)) from the nearest place of a surface of radius R.
+    let sharp = way * way < 4.0 * radius * bulge;
+    s > 0.02 && s < 0.98 && (bulge > BULGE * radius || sharp && bulge > SHARP_BULGE * radius)
+}
+
+/// Drops rows at particles beside an edge that has its own row on the element: both have the same foot. A thread bears on an edge with its side, across its direction; a
+/// row at a particle that is yet to come to the edge would bear on it head on, and each particle that is drawn over it would be a bump.
+fn leave_to_edges(rows: &mut Vec<ShapeRow>, start: &[DVec3]) {
+    let at = |r: &ShapeRow| {
+        let e = r.element as usize;
+        if r.s == 0.0 { start[e] } else { start[e].lerp(start[e + 1], r.s) }
+    };
+    let foot = |r: &ShapeRow| at(r) - r.before.normal * r.before.value;
+    let mut k = 0;
+    while k < rows.len() {
+        let row = rows[k];
+        let beside = |edge: &ShapeRow| {
+            let way = (at(edge) - at(&row)).length();
+            edge.s > 0.0
+                && edge.s < 1.0
+                && edge.shape == row.shape
+                && (edge.place() - row.place()).abs() < 1.0
+                && edge.before.value < row.before.value
+                && way < 1.5 * row.radius
+                && (foot(edge) - foot(&row)).length() < 0.5 * way
+        };
+        let near = rows[k.saturating_sub(2 * params::PLACES)..(k + 1 + 2 * params::PLACES).min(rows.len())].iter().any(beside);
+        if (row.s == 0.0 || row.s == 1.0) && near {
+            rows.remove(k);
+        } else {
+            k += 1;
+        }
+    }
+}
+
+/// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on another one in its place: the half of a
+/// post that a thread touches now may be the other one.
+fn inherit(old: &[ShapeContact], model: &Model, rows: &mut [ShapeRow]) {
+    for c in old {
+        let place = f64::from(c.element) + c.s;
+        let nearest = |rows: &[ShapeRow], reach: f64, facing: f64| {
+            let far = |r: &ShapeRow| (r.place() - place).abs();
+            let there = |r: &ShapeRow| far(r) <= reach && model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
+            let found = rows.iter().enumerate().filter(|(_, r)| there(r)).min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
+            found.map(|(k, _)| k)
+        };
+        let from = rows.partition_point(|r| r.key() < (c.shape, place - 0.3));
+        let to = rows.partition_point(|r| r.key() <= (c.shape, place + 0.3));
+        let found = nearest(&rows[from..to], 0.3, 0.5).map(|k| from + k).or_else(|| nearest(rows, 1e-9, 0.9999));
+        if let Some(k) = found {
+            rows[k].receive(c);
+        }
+    }
 }
 
 /// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that is nearer now and next, or
@@ -212,7 +378,8 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
 fn merge(rows: &mut Vec<ShapeRow>) {
     rows.sort_unstable_by(|a, b| a.element.cmp(&b.element).then(a.s.total_cmp(&b.s)).then(b.carried.total_cmp(&a.carried)).then(a.shape.cmp(&b.shape)));
     rows.dedup_by(|b, a| {
-        let place = a.element == b.element && (a.s - b.s).abs() < 1e-3;
+        // Neighboring elements share a particle.
+        let place = (a.place() - b.place()).abs() < 1e-3;
         if !place || a.normal.dot(b.normal) < 0.99 {
             return false;
         }
@@ -226,13 +393,21 @@ fn merge(rows: &mut Vec<ShapeRow>) {
     });
 }
 
+/// What of a surface's direction is across the thread. A thread is bent over an edge in a smooth curve, which the edge presses across: across the elements, from
+/// one to the next, the force would turn back and forth, and each joint drawn over the edge would be a notch.
+fn across(normal: DVec3, smooth: Option<DVec3>) -> DVec3 {
+    smooth.map_or(normal, |t| (normal - t * t.dot(normal)).normalize_or(normal))
+}
+
 /// Looks where the row is now; its point on the centerline.
-fn look(model: &Model, state: &State, row: &mut ShapeRow) -> DVec3 {
+fn look(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let shape = model.shapes.at(row.shape).expect("rows name living shapes");
     let p = state.position[e].lerp(state.position[e + 1], row.s);
-    let d = shape.collider.distance(&state.shape_pose[row.shape as usize], p, Some(row.normal));
-    row.normal = d.normal;
+    let from = start.position[e].lerp(start.position[e + 1], row.s);
+    let k = row.shape as usize;
+    let d = shape.collider.follow((&start.shape[k], from, row.before), (&state.shape_pose[k], p), row.normal);
+    row.normal = across(d.normal, row.smooth);
     row.gap = d.value - row.radius * (1.0 + 2.0 * params::KEEP);
     p
 }
@@ -252,7 +427,7 @@ fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
 /// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first iteration the row is
 /// linearized where it carried its force: Newton starts where velocity leads, which may be just off the surface.
 fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DVec3 {
-    look(model, state, row);
+    look(model, state, start, row);
     let n = row.normal;
     let depth = (-row.gap).max(0.0);
     row.pressed = row.hardness * depth * depth;
@@ -270,7 +445,7 @@ fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, fi
 
 /// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has stopped.
 fn decide(row: &mut ShapeRow, trial: DVec3) {
-    let (size, limit) = (trial.length(), row.mu * row.pressed);
+    let (size, limit) = (trial.length(), row.mu() * row.pressed);
     row.mode = match row.mode {
         Mode::Sticks if size > limit => Mode::Slides(trial / size),
         Mode::Slides(d) if size > limit && trial.dot(d) > 0.0 => Mode::Slides(trial / size),
@@ -287,7 +462,7 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
             DMat3::from_diagonal(DVec3::splat(k))
         }
         Mode::Slides(before) => {
-            let limit = row.mu * row.pressed;
+            let limit = row.mu() * row.pressed;
             let size = trial.length();
             let forward = size > limit && trial.dot(before) > 0.0;
             let direction = if forward { trial / size } else { (before - n * n.dot(before)).normalize_or_zero() };
@@ -322,7 +497,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, firs
     let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
     for row in &mut rows.shapes {
         if !row.firm {
-            look(model, state, row);
+            look(model, state, &start, row);
             continue;
         }
         let trial = press(model, state, &start, row, first);
@@ -389,8 +564,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let arm = n * -row.radius;
         let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
         let slip = slip(state, start, row) + moved + turned.cross(arm) - row.anchor * row.entered;
-        // An overlap from before, beyond what the force carried before explains, is pushed out over a few substeps.
-        let allowed = (row.start_gap + (row.carried / row.hardness).sqrt()).min(0.0) * params::RECOVER;
+        let (allowed, normal) = regain(row.start_gap, (row.carried / row.hardness).sqrt(), row.entered);
         let end = Endpoint::new(e, row.s, axes, arm, row.along);
         entries.push(Entry {
             source: Source::Shape(k as u32),
@@ -401,8 +575,8 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
                 (j, DVec3::new(d.dot(n), d.dot(t1), d.dot(t2)))
             }),
             free: DVec3::new(gap - allowed, slip.dot(t1), slip.dot(t2)),
-            mu: row.mu,
-            compliance: row.entered,
+            mu: row.mu(),
+            compliance: DVec3::new(normal, row.entered, row.entered),
             radius: row.radius,
             force: DVec3::new(row.normal_force, row.friction.dot(t1), row.friction.dot(t2)),
         });
@@ -437,7 +611,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 let front = iterations > params::FRONT && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
-                look(model, state, &mut now);
+                look(model, state, &start, &mut now);
                 if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
                     (row.wanted, settled) = (true, false);
                 }
@@ -445,6 +619,74 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
         }
     }
     settled
+}
+
+/// Adds rows where the iterate comes nearer to a shape than the forces there press it, although all rows are satisfied: a row keeps its place on the thread, and the
+/// edge or wall that it was set up against may have come to another. True when any was added.
+pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
+    let mut fresh = core::mem::take(&mut scratch.rows.fresh_shapes);
+    fresh.clear();
+    let x = &state.position;
+    for (slot, e) in &scratch.candidates.shapes {
+        let (k, e) = (*slot as usize, *e as usize);
+        let collider = &model.shapes.at(*slot).expect("candidate shapes live").collider;
+        let r = scratch.radius[e];
+        let length = (x[e + 1] - x[e]).length();
+        let (start_pose, pose) = (&scratch.start_shape_pose[k], &state.shape_pose[k]);
+        let site = Site { model, slot: *slot, element: e, pushed: DVec3::ZERO, start: &scratch.start, start_pose, now: x, pose };
+        let local = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
+        let ends = local.map(|p| collider.distance_local(p));
+        let least = r * (1.0 + 2.0 * (params::KEEP - params::SLACK));
+        if ends[0].value.min(ends[1].value) - 0.5 * length >= least {
+            continue;
+        }
+        let rows = &scratch.rows.shapes;
+        let mut pressed = None;
+        let mut look = |s: f64, d: Distance| {
+            let pressed = *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e));
+            if d.value >= least - pressed {
+                return;
+            }
+            let at = |x: &[DVec3]| x[e].lerp(x[e + 1], s);
+            let mut before = collider.distance(start_pose, at(site.start));
+            let normal = pose.orientation * d.normal;
+            let facing = (start_pose.orientation.conjugate() * before.normal).dot(d.normal);
+            if facing < 0.7 {
+                // It came from elsewhere to this wall, if it was before it.
+                let way = pose.inverse_transform_point(at(x)) - start_pose.inverse_transform_point(at(site.start));
+                before = Distance { value: d.value - d.normal.dot(way), normal: start_pose.orientation * d.normal };
+                if before.value <= 0.0 {
+                    return;
+                }
+            }
+            // What was as deep and only stays there is left to the rows that are.
+            if d.value >= before.value && before.value < r {
+                return;
+            }
+            let place = e as f64 + s;
+            let known = |row: &ShapeRow| row.shape == *slot && (row.place() - place).abs() * length < params::SAME_ROW * r && row.normal.dot(normal) > 0.7;
+            if !rows.iter().chain(&fresh).any(known) {
+                let mut row = site.row(s, before, Distance { value: d.value, normal });
+                (row.normal, row.gap, row.wanted) = (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);
+                fresh.push(row);
+            }
+        };
+        look(0.0, ends[0]);
+        if !model.is_element(e + 1) {
+            look(1.0, ends[1]);
+        }
+        collider.least_between(local, least.min(ends[0].value.min(ends[1].value) - SHARP_BULGE * r), |s, d| {
+            if bulges(ends.map(|d| d.value), s, d.value, length, r) {
+                look(s, d);
+            }
+        });
+    }
+    let any = !fresh.is_empty();
+    scratch.rows.shapes.extend_from_slice(&fresh);
+    // Rod by rod, as they are looked at.
+    scratch.rows.shapes.sort_unstable_by(|a, b| a.place().total_cmp(&b.place()).then(a.shape.cmp(&b.shape)));
+    scratch.rows.fresh_shapes = fresh;
+    any
 }
 
 /// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed with.
@@ -464,9 +706,9 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
             let beyond = trial.length() - row.friction.length();
             (if beyond > 0.0 { beyond / row.stiffness } else { 0.0 }, DVec3::ZERO)
         } else {
-            look(model, state, row);
+            look(model, state, &start, row);
             let left = slip(state, &start, row) + (row.friction - row.anchor) * row.entered;
-            let at_limit = row.friction.length() >= 0.9999 * row.mu * row.normal_force;
+            let at_limit = row.friction.length() >= 0.9999 * row.mu() * row.normal_force;
             if at_limit { (left.length(), DVec3::ZERO) } else { (0.0, left.clamp_length_max(0.1 * row.radius)) }
         };
         if row.normal_force > 0.0 {

@@ -17,7 +17,7 @@ use crate::math::log;
 use crate::model::Model;
 use crate::params;
 use crate::row::Start;
-use crate::row::couple::{Endpoint, Entry, Source};
+use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::scratch::Scratch;
 use crate::state::{State, ThreadContact};
 use glam::DVec3;
@@ -36,8 +36,11 @@ pub(crate) struct ThreadRow {
     /// Distance kept between the centerlines \[m\] and the two radii.
     sum: f64,
     radii: [f64; 2],
-    /// Compliance of the contact itself \[m/N\].
-    compliance: f64,
+    /// Normal force over depth^(3/2) \[N/m^(3/2)\] (Hertz), and the least force whose secant is taken \[N\].
+    hertz: f64,
+    least: f64,
+    /// Compliance with which it last entered the small problem \[m/N\].
+    entered: f64,
     mu: [f64; 2],
     sliding: bool,
     /// Friction force on a at the start of the substep, and slip that was still to be undone.
@@ -47,8 +50,10 @@ pub(crate) struct ThreadRow {
     pub force: DVec3,
     /// Left out of the small problem, it was violated.
     wanted: bool,
-    /// Clearance already missing at the start: it is won back over a few substeps, not at once.
+    /// Clearance already missing at the start: what its force does not explain is won back over a few substeps, not at once.
     start_gap: f64,
+    /// Depth to which its force at the start presses \[m\].
+    carried: f64,
 }
 
 impl ThreadRow {
@@ -58,6 +63,9 @@ impl ThreadRow {
         // Tangents along and across the mean direction of a: any pair will do, this one turns with the thread.
         let along = start[a + 1] - start[a];
         let t1 = (along - normal * normal.dot(along)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let sum = ra.radius + rb.radius;
+        let modulus = 1.0 / (1.0 / ra.material.contact_modulus() + 1.0 / rb.material.contact_modulus());
+        let hertz = 4.0 / 3.0 * modulus * (ra.radius * rb.radius).sqrt().sqrt();
         ThreadRow {
             a,
             b,
@@ -65,9 +73,11 @@ impl ThreadRow {
             t,
             axes: [normal, t1, normal.cross(t1)],
             along: [along.normalize(), (start[b + 1] - start[b]).normalize()],
-            sum: (ra.radius + rb.radius) * (1.0 + params::KEEP),
+            sum: sum * (1.0 + params::KEEP),
             radii: [ra.radius, rb.radius],
-            compliance: 1.0 / ra.contact_stiffness() + 1.0 / rb.contact_stiffness(),
+            hertz,
+            least: hertz * (params::LIGHT * sum).powi(3).sqrt(),
+            entered: 0.0,
             mu: [f.stick, f.slide],
             sliding: false,
             anchor: DVec3::ZERO,
@@ -75,6 +85,7 @@ impl ThreadRow {
             force: DVec3::ZERO,
             wanted: false,
             start_gap: 0.0,
+            carried: 0.0,
         }
     }
 
@@ -101,6 +112,18 @@ impl ThreadRow {
             Endpoint::new(self.a, self.s, self.axes, n * -self.radii[0], self.along[0]),
             Endpoint::new(self.b, self.t, [-n, -t1, -t2], n * self.radii[1], self.along[1]),
         ]
+    }
+
+    /// How deep its force presses the two into each other \[m\].
+    pub fn depth(&self) -> f64 {
+        self.force.x * self.compliance()
+    }
+
+    /// Depth over force, at the present force: a secant of Hertz' law, and below the least force a straight line.
+    fn compliance(&self) -> f64 {
+        let force = self.force.x.max(self.least);
+        let over = force / self.hertz;
+        libm::cbrt(over * over) / force
     }
 
     pub fn elements(&self) -> [usize; 2] {
@@ -240,6 +263,7 @@ fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
             row.anchor += friction;
             row.drift = c.drift - n * n.dot(c.drift);
             row.sliding |= c.sliding;
+            row.carried = row.depth();
         }
     }
 }
@@ -258,9 +282,9 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         }
         let turn = |e: usize, k: usize| step[2 * e + 1] - row.along[k] * row.along[k].dot(step[2 * e + 1]);
         let spin = turn(row.a, 0).cross(n * -row.radii[0]) - turn(row.b, 1).cross(n * row.radii[1]);
-        let slip = row.slip(state, start) + moved + spin + row.drift - row.anchor * row.compliance;
-        // An overlap from before is pushed out over a few substeps.
-        let allowed = if row.start_gap < 0.0 { row.start_gap * params::RECOVER } else { 0.0 };
+        row.entered = row.compliance();
+        let slip = row.slip(state, start) + moved + spin + row.drift - row.anchor * row.entered;
+        let (allowed, normal) = regain(row.start_gap, row.carried, row.entered);
         let [a, b] = row.endpoints();
         entries.push(Entry {
             source: Source::Thread(k as u32),
@@ -269,7 +293,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
             slider: None,
             free: DVec3::new(gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])),
             mu: row.mu[usize::from(row.sliding)],
-            compliance: row.compliance,
+            compliance: DVec3::new(normal, row.entered, row.entered),
             radius: row.radii[0].min(row.radii[1]),
             force: row.force,
         });
@@ -358,7 +382,7 @@ pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
     for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {
         let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
         let limit = row.mu[usize::from(row.sliding)] * row.force.x;
-        let left = row.drift + row.slip(state, &start) + (friction - row.anchor) * row.compliance;
+        let left = row.drift + row.slip(state, &start) + (friction - row.anchor) * row.entered;
         let at_limit = friction.length() >= 0.9999 * limit;
         let sliding = at_limit && left.length() > params::SLIP * row.radii[0].min(row.radii[1]);
         let drift = if at_limit { DVec3::ZERO } else { left.clamp_length_max(0.1 * row.radii[0]) };

@@ -8,6 +8,7 @@ use sutura_studies::hold::{self, Hold};
 use sutura_studies::overhand::{self, Overhand};
 use sutura_studies::robustness::Robustness;
 use sutura_studies::run::{Plan, Study, run};
+use sutura_studies::throws::Throws;
 
 /// Parameter studies of Sutura. Cases that are in the table already are left out.
 #[derive(Parser, Debug)]
@@ -37,6 +38,8 @@ enum Which {
     },
     /// Scenes of a generator, half of them absurd: no panic, no hang, no number that is not finite, the same bits however they are played
     Robustness(Robustness),
+    /// Threads thrown at, over, through and into shapes of all kinds: nothing passes, nothing is given up
+    Throws(Throws),
 }
 
 #[derive(Args, Debug)]
@@ -95,14 +98,17 @@ fn main() -> ExitCode {
         Which::Hold { common, one: Some(case) } => hold::Case::parse(&case).map(|case| {
             Hold::run(&case, common.budget(), &mut |line| eprintln!("{line}"));
         }),
-        Which::Robustness(robustness) => match robustness.run() {
-            Ok(true) => Ok(()),
-            Ok(false) => return ExitCode::FAILURE,
-            Err(e) => Err(e),
-        },
+        Which::Robustness(robustness) => return verdict(robustness.run()),
+        Which::Throws(throws) => return verdict(throws.run()),
     };
+    verdict(done.map(|()| true))
+}
+
+/// What the program ends with: done, not as it must be, or an error.
+fn verdict(done: anyhow::Result<bool>) -> ExitCode {
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(e) => {
             eprintln!("error: {e:#}");
             ExitCode::from(2)

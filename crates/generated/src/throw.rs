@@ -206,7 +206,7 @@ fn tilted(d: &mut Draw, v: DVec3, angle: f64) -> DVec3 {
     (DQuat::from_axis_angle(axis, d.even(0.0, angle)) * v).normalize()
 }
 
-/// A cylinder, capsule or ball, box, by turns, as a solid or mesh.
+/// The shape of a family, of sizes that go with a thread of this radius and length.
 fn target(d: &mut Draw, family: Family, radius: f64, length: f64) -> Target {
     let outside = |d: &mut Draw, geometry: Geometry, toward: DVec3, aim: DVec3| {
         let along = across(d, toward);
@@ -334,6 +334,12 @@ const MOST_DRAWS: u32 = 10_000;
 
 /// Least room at the start, in radii of the thread.
 const ROOM: f64 = 0.3;
+/// Least distance of points half a radius apart, in radii: between them it is less by a quarter at most.
+const CLEAR: f64 = 1.27;
+/// Part of its length that the middle of a thread held at both ends may be carried off by pose, and the modulus of those that bear it \[Pa\]: it is
+/// then longer by a quarter, and pressed in by a third of its radius.
+const CARRIED: f64 = 0.35;
+const SOFT: (f64, f64) = (1e7, 1e8);
 
 fn settings(d: &mut Draw, gravity: DVec3) -> Settings {
     let mu = if d.chance(0.8) { d.even(0.0, 0.5) } else { 0.0 };
@@ -358,6 +364,30 @@ fn held(rod: usize, place: Place, drive: Drive) -> Held {
     Held { rod, place, hold: Hold::Pin, drive, ramp: 0.0, from: 0, until: u32::MAX, velocity: DVec3::ZERO, spin: DVec3::ZERO }
 }
 
+/// What holds a thread that is met, beside what it is led by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Holds {
+    Nothing,
+    OneEnd,
+    BothEnds,
+    /// Hands at both ends, which give way.
+    Hands,
+}
+
+fn hold(scene: &mut Scene, holds: Holds, mut hand: impl FnMut(Place) -> Drive) {
+    let by_pose = |place| held(0, place, Drive::Pose);
+    match holds {
+        Holds::Nothing => {}
+        Holds::OneEnd => scene.grips.push(by_pose(Place::Start)),
+        Holds::BothEnds => scene.grips.extend([Place::Start, Place::End].map(by_pose)),
+        Holds::Hands => {
+            for place in [Place::Start, Place::End] {
+                scene.grips.push(held(0, place, hand(place)));
+            }
+        }
+    }
+}
+
 /// Of a straight motion and spin.
 fn moved(pose: &Pose, velocity: DVec3, spin: DVec3, time: f64) -> Pose {
     Pose::new(pose.position + velocity * time, (exp(spin * time) * pose.orientation).normalize())
@@ -371,15 +401,30 @@ fn throw_off(scene: &mut Scene, rod: usize, thread: &Thread, velocity: DVec3) {
 }
 
 fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
-    let thread = Thread::draw(d, (5e-5, 5e-4), family != Family::Slot);
+    let mut thread = Thread::draw(d, (5e-5, 5e-4), family != Family::Slot);
     let (radius, length) = (thread.radius, thread.length());
     let t = target(d, family, radius, length);
     let how = [How::Driven, How::Driven, How::Pushed, How::Thrown, How::Pulled, How::Led][d.whole(0, 5) as usize];
-    let speed = if how == How::Thrown { d.log(0.2, 5.0) } else { d.log(0.01, 2.0) };
-    let frame = if how == How::Thrown { 1.0 / 240.0 } else { 1.0 / [60.0, 120.0, 240.0][d.whole(0, 2) as usize] };
+    // Half of what is driven is as fast as hands and instruments get.
+    let slowest = if d.chance(0.5) { 0.2 } else { 0.01 };
+    let speed = if how == How::Thrown { d.log(0.2, 5.0) } else { d.log(slowest, 2.0) };
+    // What holds a thread that is met.
+    let holds = [Holds::Nothing, Holds::OneEnd, Holds::BothEnds, Holds::Hands, Holds::Hands][d.whole(0, 4) as usize];
+    let holds = if t.inside && matches!(holds, Holds::OneEnd | Holds::BothEnds) { Holds::Hands } else { holds };
+    let taut = holds == Holds::BothEnds && matches!(how, How::Driven | How::Pushed);
+    let short = how == How::Thrown || taut && how == How::Driven;
+    let frame = if short { 1.0 / 240.0 } else { 1.0 / [60.0, 120.0, 240.0][d.whole(0, 2) as usize] };
     let time = d.even(0.05, 0.3);
     let frames = (time / frame).ceil() as u32;
-    let travel = speed * time;
+    // What is driven against a thread held at both ends stops before that bears no more.
+    let moving = if taut && how == How::Driven { frames.min((CARRIED * length / (speed * frame)) as u32) } else { frames };
+    if moving == 0 {
+        return None;
+    }
+    if taut && how == How::Driven {
+        thread.material.young_modulus = d.log(SOFT.0, SOFT.1);
+    }
+    let travel = speed * frame * f64::from(moving);
     // What moves comes to the shape in the first third of the time.
     let gap = radius * ROOM + (radius * d.log(0.1, 10.0)).min(0.3 * travel);
     let run_up = if how == How::Thrown { 1.2 * speed * frame } else { 0.0 };
@@ -399,7 +444,7 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
         place.position += toward * run_up;
     }
     let x: Vec<DVec3> = thread.points.iter().map(|p| place.transform_point(*p)).collect();
-    if near::shape(&t.geometry, &pose, &near::samples(&x, 0.5 * radius)) < radius * (1.25 + 0.9 * ROOM) - 0.25 * radius {
+    if near::shape(&t.geometry, &pose, &near::samples(&x, 0.5 * radius)) < CLEAR * radius {
         return None;
     }
 
@@ -409,7 +454,8 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
         _ => toward * -9.81,
     };
     let mut scene = empty(settings(d, gravity), frame, frames);
-    let stretch = if d.chance(0.2) { Stretch::Inextensible } else { Stretch::Elastic };
+    // Between two ends that do not give way, what meets a thread lengthens it.
+    let stretch = if d.chance(0.2) && !taut { Stretch::Inextensible } else { Stretch::Elastic };
     scene.rods.push(thread.spec(&place, stretch));
     let (mut velocity, mut spin) = (DVec3::ZERO, DVec3::ZERO);
     let mut motion = ShapeMotion::Fixed;
@@ -420,45 +466,23 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
     match how {
         How::Driven => {
             velocity = tilted(d, toward, 0.3) * speed;
-            let spins = d.chance(0.4);
-            if spins {
+            if d.chance(0.4) && !taut {
                 spin = d.direction() * d.log(0.5, 50.0);
             }
             motion = ShapeMotion::Driven;
-            match d.whole(0, 3) {
-                0 => {}
-                1 if !t.inside => scene.grips.push(held(0, Place::Start, Drive::Pose)),
-                2 if !t.inside && !spins && thread.material.young_modulus < 1e8 && stretch == Stretch::Elastic && travel < 0.35 * length => {
-                    scene.grips.extend([Place::Start, Place::End].map(|place| held(0, place, Drive::Pose)));
-                }
-                _ => {
-                    let fastest = speed + spin.length() * near::extent(&t.geometry);
-                    for (place, out) in [Place::Start, Place::End].into_iter().zip(outward) {
-                        let drive = hand(d, out, fastest);
-                        scene.grips.push(held(0, place, drive));
-                    }
-                }
-            }
-            for k in 0..frames {
+            let fastest = speed + spin.length() * near::extent(&t.geometry);
+            hold(&mut scene, holds, |place| hand(d, outward[usize::from(place == Place::End)], fastest));
+            for k in 0..moving {
                 scene.acts.push((k, Act::ShapePose(0, moved(&pose, velocity, spin, f64::from(k + 1) * frame))));
             }
         }
         How::Pushed => {
             motion = ShapeMotion::Pushed { direction: toward, force: thread.force(d), speed_limit: speed };
-            match d.whole(0, 2) {
-                0 => {}
-                1 if !t.inside => scene.grips.extend([Place::Start, Place::End].map(|place| held(0, place, Drive::Pose))),
-                _ => {
-                    for (place, out) in [Place::Start, Place::End].into_iter().zip(outward) {
-                        let drive = hand(d, out, speed);
-                        scene.grips.push(held(0, place, drive));
-                    }
-                }
-            }
+            hold(&mut scene, holds, |place| hand(d, outward[usize::from(place == Place::End)], speed));
         }
         How::Thrown => {
             throw_off(&mut scene, 0, &thread, -toward * speed);
-            if !t.inside && d.chance(0.3) {
+            if holds == Holds::OneEnd {
                 scene.grips.push(held(0, Place::Start, Drive::Pose));
             }
             passive_from = Some(1);
@@ -490,7 +514,7 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
         let at = if grip.place == Place::Start { x[0] } else { x[thread.n()] };
         for k in 0..=4 * frames {
             let time = 0.25 * f64::from(k) * frame;
-            let shape = moved(&pose, velocity, spin, time);
+            let shape = moved(&pose, velocity, spin, time.min(f64::from(moving) * frame));
             if near::shape(&t.geometry, &shape, &[at + grip.velocity * time]) < 1.3 * radius {
                 return None;
             }

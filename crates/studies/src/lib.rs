@@ -3,6 +3,8 @@
 
 pub mod case;
 pub mod curve;
+pub mod firm;
+pub mod hands;
 pub mod hold;
 pub mod map;
 pub mod overhand;

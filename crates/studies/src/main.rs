@@ -4,6 +4,8 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use sutura_studies::case::{Budget, Filter, seconds};
+use sutura_studies::firm::Firm;
+use sutura_studies::hands::Hands;
 use sutura_studies::hold::{self, Hold};
 use sutura_studies::overhand::{self, Overhand};
 use sutura_studies::robustness::Robustness;
@@ -40,6 +42,10 @@ enum Which {
     Robustness(Robustness),
     /// Threads thrown at, over, through and into shapes of all kinds: nothing passes, nothing is given up
     Throws(Throws),
+    /// Two noisy hands at play with a thread over a post: nothing passes, nothing is given up, frame by frame
+    Hands(Hands),
+    /// Loads up to the strength of a suture: knots, crossed threads, turns around a post, hooked bights, edges
+    Firm(Firm),
 }
 
 #[derive(Args, Debug)]
@@ -100,6 +106,8 @@ fn main() -> ExitCode {
         }),
         Which::Robustness(robustness) => return verdict(robustness.run()),
         Which::Throws(throws) => return verdict(throws.run()),
+        Which::Hands(hands) => return verdict(Ok(hands.run())),
+        Which::Firm(firm) => return verdict(firm.run()),
     };
     verdict(done.map(|()| true))
 }

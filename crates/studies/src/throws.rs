@@ -61,6 +61,8 @@ pub struct Seen {
     pub incidents: BTreeMap<&'static str, u64>,
     /// The first of them.
     pub first_incident: Option<Incident>,
+    /// Whether anything touched.
+    pub met: bool,
     /// Refused by the engine when it was built.
     pub refused: u32,
     /// Time simulated and planned \[s\].
@@ -168,6 +170,7 @@ pub fn examine(throw: &Throw, budget: f64, trace: &mut dyn FnMut(String)) -> See
         for (sum, n) in seen.work.iter_mut().zip([report.substeps, report.rejected, report.newton_iterations]) {
             *sum += u64::from(n);
         }
+        seen.met |= report.contacts > 0;
         for incident in &report.incidents {
             *seen.incidents.entry(kind(&incident.kind)).or_default() += 1;
             seen.first_incident.get_or_insert_with(|| incident.clone());
@@ -204,6 +207,7 @@ pub fn examine(throw: &Throw, budget: f64, trace: &mut dyn FnMut(String)) -> See
 #[derive(Default)]
 struct Sums {
     throws: u64,
+    met: u64,
     failed: u64,
     passed: u64,
     passages: usize,
@@ -222,6 +226,7 @@ struct Sums {
 impl Sums {
     fn take(&mut self, number: u64, seen: &Seen) {
         self.throws += 1;
+        self.met += u64::from(seen.met);
         self.failed += u64::from(seen.fault().is_some());
         self.passed += u64::from(seen.passages > 0);
         self.passages += seen.passages;
@@ -246,6 +251,7 @@ impl Sums {
         vec![
             name.into(),
             self.throws.to_string(),
+            self.met.to_string(),
             self.failed.to_string(),
             self.passed.to_string(),
             self.passages.to_string(),
@@ -263,9 +269,10 @@ impl Sums {
     }
 }
 
-const COLUMNS: [&str; 15] = [
+const COLUMNS: [&str; 16] = [
     "what",
     "throws",
+    "touching",
     "failed",
     "with passages",
     "passages",

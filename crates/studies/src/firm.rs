@@ -532,8 +532,9 @@ impl Firm {
                 Ended::Panicked => Row { ended: "panicked".into(), ..Row::default() },
                 Ended::Hung => Row { ended: "hangs".into(), ..Row::default() },
             };
+            let line = verbose.then(|| row.cells(&cases[k as usize].0).join(" | "));
             rows.insert(k, row);
-            None
+            line
         });
         print!("{}", markdown(&COLUMNS, rows.iter().map(|(k, row)| row.cells(&cases[*k as usize].0))));
         let count = |f: &dyn Fn(&Row) -> bool| rows.values().filter(|r| f(r)).count();

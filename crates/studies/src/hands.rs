@@ -35,6 +35,9 @@ pub struct Hands {
     /// CPU time after which a pair is given up
     #[arg(long, default_value = "5min", value_parser = seconds)]
     pub budget: f64,
+    /// Say of each pair how it did when it has
+    #[arg(long, short)]
+    pub verbose: bool,
 }
 
 /// Threads that take turns.
@@ -336,8 +339,9 @@ impl Hands {
                     Ended::Panicked => Played { ended: "panicked".into(), ..Played::default() },
                     Ended::Hung => Played { ended: "hangs".into(), ..Played::default() },
                 };
+                let line = self.verbose.then(|| played.row(name(number)).join(" | "));
                 all.insert(number, played);
-                None
+                line
             },
         );
         print!("{}", markdown(&COLUMNS, all.iter().map(|(number, played)| played.row(name(*number)))));

@@ -82,6 +82,9 @@ pub struct Seen {
 /// Part of the energy turned over by which it may be above its start, that of contacts pressed in and of lengths within the tolerance.
 pub const GAIN: f64 = 0.02;
 
+/// Clearance under which things have touched: some is kept between them.
+const TOUCHES: f64 = 0.02;
+
 impl Seen {
     /// Least clearance of all.
     pub fn clearance(&self) -> Option<f64> {
@@ -198,6 +201,7 @@ pub fn examine(throw: &Throw, budget: f64, trace: &mut dyn FnMut(String)) -> See
     seen.passages = report.crossings.iter().map(|c| place(c.what)).collect::<BTreeSet<_>>().len();
     seen.first_passage = report.crossings.first().copied();
     seen.closest = [report.thread_closest, report.shape_closest];
+    seen.met |= seen.clearance().is_some_and(|c| c < TOUCHES);
     seen.gain = throw.passive_from.map(|_| turnover.gain());
     seen.refused = player.refused;
     seen

@@ -284,7 +284,8 @@ fn knot(thread: &Thread, force: f64, let_go: bool, budget: Budget, trace: &mut d
     };
     let ended = go(&mut run);
     let after = if let_go { format!(", let go {}", shape(&run)) } else { String::new() };
-    run.row.knot = format!("{before}, drawn {}{after}", run.row.knot);
+    let tight = if run.row.knot.is_empty() { shape(&run) } else { std::mem::take(&mut run.row.knot) };
+    run.row.knot = format!("{before}, drawn {tight}{after}");
     run.row.force = format!("{:.3} and {:.3} of {force:.2} N", drawn[0], drawn[1]);
     // It rests only in the limit.
     run.row.agrees = Some(drawn.iter().all(|f| (f / force - 1.0).abs() < 0.01));
@@ -318,6 +319,8 @@ fn crossed(thread: &Thread, force: f64, jaws: bool, budget: Budget, trace: &mut 
     let ended = run.wait(1.0);
     run.rests(None);
     let pressed: f64 = run.s.world.contacts().filter(|c| matches!(c.b, ContactWith::Thread(..))).map(|c| c.force.z.abs()).sum();
+    // Several rows share it.
+    run.row.hertz[0] = Some(run.thread.crossed(pressed));
     run.row.force = format!("{pressed:.3} of {force} N");
     run.row.agrees = Some((pressed / force - 1.0).abs() < 0.02);
     Ok(run.row(ended))
@@ -395,7 +398,9 @@ const EDGE_SPEED: f64 = 5e-3;
 /// A thread level from the grip to the edge, down from there, with a dead load at its end; drawn, and let out again. `radius` 0 is the edge of a box.
 fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, trace: &mut dyn FnMut(String)) -> Result<Row, String> {
     let (r, level, down) = (thread.radius, 0.03, 0.02);
-    let reach = radius + 1.03 * r;
+    // So far out that no chord of the bend overlaps to begin with. The thread then comes down to the edge from the grip, and turns by a little less.
+    let reach = (radius + 1.1 * r).hypot(0.55 * element);
+    let turn = FRAC_PI_2 - ((reach - radius - r) / level).atan();
     let mut points = vec![DVec3::new(-level, 0.0, reach)];
     points.extend((0..=100).map(|i| libm::sincos(FRAC_PI_2 * f64::from(i) / 100.0)).map(|(s, c)| DVec3::new(reach * s, 0.0, reach * c)));
     points.push(DVec3::new(reach, 0.0, -down));
@@ -407,7 +412,7 @@ fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, t
             let lying = DQuat::from_rotation_x(FRAC_PI_2);
             ShapeSpec::fixed(Geometry::Cylinder { radius, half_length: 0.01 }, Pose::new(DVec3::ZERO, lying))
         } else {
-            // Its edge is at the origin; the thread lies along both faces, which bear nothing.
+            // Its edge is at the origin; the thread goes along both faces.
             let half = 5e-3;
             ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::new(half, 0.01, half) }, Pose::at(DVec3::new(-half, 0.0, -half)))
         };
@@ -415,7 +420,7 @@ fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, t
         let grip = world.insert_grip(&pin(rod, Place::Start, Drive::Pose))?;
         Ok((grip, world.insert_load(&LoadSpec { rod, kind: dead(0.0) })?))
     })?;
-    let (high, low) = ((EDGE_MU * FRAC_PI_2).exp(), (-EDGE_MU * FRAC_PI_2).exp());
+    let (high, low) = ((EDGE_MU * turn).exp(), (-EDGE_MU * turn).exp());
     // What the thread stretches by between the two forces, and then whole elements.
     let stretch = 1.5 * (high - low) * load * level / thread.axial();
     let measured = element * (3e-3 / element).floor().max(1.0);
@@ -579,6 +584,8 @@ mod tests {
         for (name, run) in all.iter().filter(|c| !c.0.starts_with("edge") || c.0.contains("0.6 mm")) {
             let row = run(Budget { cpu_s: 0.0, frames: 1 }, &mut |_| {}).unwrap();
             assert_eq!((row.passages, row.ended.is_empty()), (0, false), "{name}");
+            // No deeper than a first frame presses.
+            assert!(row.least.into_iter().flatten().all(|c| c > -0.05), "{name}: {:?}", row.least);
         }
     }
 }

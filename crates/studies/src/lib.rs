@@ -3,12 +3,16 @@
 
 pub mod case;
 pub mod curve;
+pub mod firm;
+pub mod hands;
 pub mod hold;
 pub mod map;
 pub mod overhand;
+pub mod pool;
 pub mod robustness;
 pub mod run;
 pub mod session;
 pub mod strength;
 pub mod table;
+pub mod throws;
 pub mod tie;

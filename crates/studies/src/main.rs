@@ -4,10 +4,13 @@ use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use sutura_studies::case::{Budget, Filter, seconds};
+use sutura_studies::firm::Firm;
+use sutura_studies::hands::Hands;
 use sutura_studies::hold::{self, Hold};
 use sutura_studies::overhand::{self, Overhand};
 use sutura_studies::robustness::Robustness;
 use sutura_studies::run::{Plan, Study, run};
+use sutura_studies::throws::Throws;
 
 /// Parameter studies of Sutura. Cases that are in the table already are left out.
 #[derive(Parser, Debug)]
@@ -37,6 +40,12 @@ enum Which {
     },
     /// Scenes of a generator, half of them absurd: no panic, no hang, no number that is not finite, the same bits however they are played
     Robustness(Robustness),
+    /// Threads thrown at, over, through and into shapes of all kinds: nothing passes, nothing is given up
+    Throws(Throws),
+    /// Two noisy hands at play with a thread over a post: nothing passes, nothing is given up, frame by frame
+    Hands(Hands),
+    /// Loads up to the strength of a suture: knots, crossed threads, turns around a post, hooked bights, edges
+    Firm(Firm),
 }
 
 #[derive(Args, Debug)]
@@ -95,14 +104,19 @@ fn main() -> ExitCode {
         Which::Hold { common, one: Some(case) } => hold::Case::parse(&case).map(|case| {
             Hold::run(&case, common.budget(), &mut |line| eprintln!("{line}"));
         }),
-        Which::Robustness(robustness) => match robustness.run() {
-            Ok(true) => Ok(()),
-            Ok(false) => return ExitCode::FAILURE,
-            Err(e) => Err(e),
-        },
+        Which::Robustness(robustness) => return verdict(robustness.run()),
+        Which::Throws(throws) => return verdict(throws.run()),
+        Which::Hands(hands) => return verdict(Ok(hands.run())),
+        Which::Firm(firm) => return verdict(firm.run()),
     };
+    verdict(done.map(|()| true))
+}
+
+/// What the program ends with: done, not as it must be, or an error.
+fn verdict(done: anyhow::Result<bool>) -> ExitCode {
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(e) => {
             eprintln!("error: {e:#}");
             ExitCode::from(2)

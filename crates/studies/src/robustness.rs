@@ -4,18 +4,15 @@
 
 use anyhow::Context as _;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use sutura_generated::make::numbered;
 use sutura_generated::play::{Seen, watch};
 use sutura_generated::{Player, Scene};
 
 use crate::case::seconds;
+use crate::pool::{self, Ended};
 use crate::session::quantile;
 
 /// What is asked for.
@@ -60,31 +57,6 @@ fn examine(name: &str, scene: &Scene) -> Seen {
     seen
 }
 
-/// How a scene ended.
-enum Ended {
-    Well(Seen),
-    Panicked,
-    Hung,
-}
-
-/// Plays a scene on a thread of its own, which is left to itself when it does not come back.
-fn apart(seed: u64, number: u64, limit: Duration) -> Ended {
-    let (tell, hear) = channel();
-    let worker = std::thread::spawn(move || {
-        let (name, scene) = numbered(seed, number);
-        // Nobody hears of it when the time is up.
-        let _ = tell.send(examine(name, &scene));
-    });
-    match hear.recv_timeout(limit) {
-        Ok(seen) => Ended::Well(seen),
-        Err(RecvTimeoutError::Timeout) => Ended::Hung,
-        Err(RecvTimeoutError::Disconnected) => {
-            let _ = worker.join();
-            Ended::Panicked
-        }
-    }
-}
-
 /// Sums over the scenes of a kind.
 #[derive(Default)]
 struct Sums {
@@ -116,34 +88,16 @@ impl Robustness {
         if let Some(number) = self.only {
             return self.one(number);
         }
-        let bar = ProgressBar::new(self.scenes);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30.blue/white} {pos} of {len} scenes, {eta} left {msg}") {
-            bar.set_style(style.progress_chars("━━─"));
-        }
-        let (next, found) = (AtomicU64::new(self.first), Mutex::new(Found::default()));
-        std::thread::scope(|scope| {
-            for _ in 0..self.jobs {
-                scope.spawn(|| {
-                    loop {
-                        let number = next.fetch_add(1, Ordering::Relaxed);
-                        if number >= self.first.saturating_add(self.scenes) {
-                            return;
-                        }
-                        let ended = apart(self.seed, number, Duration::from_secs_f64(self.limit));
-                        let mut found = found.lock().expect("nothing panics while it is held");
-                        let (name, scene) = numbered(self.seed, number);
-                        let second_order = scene.settings.integrator == sutura::Integrator::TrBdf2;
-                        if let Some(line) = found.take(number, name, second_order, ended) {
-                            // A bar that is not drawn prints nothing.
-                            bar.suspend(|| eprintln!("{line}"));
-                        }
-                        bar.inc(1);
-                    }
-                });
-            }
+        let (seed, mut found) = (self.seed, Found::default());
+        let numbers = self.first..self.first.saturating_add(self.scenes);
+        let examine = move |number| {
+            let (name, scene) = numbered(seed, number);
+            examine(name, &scene)
+        };
+        pool::play(numbers, self.jobs, Duration::from_secs_f64(self.limit), examine, |number, ended| {
+            let (name, scene) = numbered(seed, number);
+            found.take(number, name, scene.settings.integrator == sutura::Integrator::TrBdf2, ended)
         });
-        bar.finish_and_clear();
-        let found = found.into_inner().expect("nothing panics while it is held");
         print!("{}", found.table(self.seed));
         Ok(found.panics.is_empty() && found.hangs.is_empty() && found.faults.is_empty())
     }
@@ -165,7 +119,7 @@ impl Robustness {
 
 impl Found {
     /// Takes note of a scene; a line to print where something is wrong.
-    fn take(&mut self, number: u64, name: &'static str, second_order: bool, ended: Ended) -> Option<String> {
+    fn take(&mut self, number: u64, name: &'static str, second_order: bool, ended: Ended<Seen>) -> Option<String> {
         let seen = match ended {
             Ended::Well(seen) => seen,
             Ended::Panicked => {

@@ -2,8 +2,10 @@
 
 use crate::case::Budget;
 use cpu_time::ThreadTime;
+use std::collections::BTreeMap;
 use sutura::audit::Audit;
 use sutura::{IncidentKind, World};
+use sutura_generated::play::kind;
 
 /// A world and what was seen of it.
 pub struct Session {
@@ -21,6 +23,8 @@ pub struct Session {
     pub newton: u64,
     /// Number of incidents.
     pub incidents: u64,
+    /// The same by kind.
+    pub kinds: BTreeMap<&'static str, u64>,
     /// The first of them in words, with its time.
     pub first_incident: String,
     /// Largest |strain - T / EA| of an element at the end of a frame, with the tension that the solver carries.
@@ -37,14 +41,18 @@ const STUCK: u32 = 30;
 impl Session {
     /// Begins; the budget counts from here, on this thread of execution.
     pub fn new(world: World, budget: Budget) -> Self {
+        let mut audit = Audit::new();
+        // What is passed in the first substep is passed from where it began.
+        audit.observe(world.view());
         Session {
             world,
-            audit: Audit::new(),
+            audit,
             ms: Vec::new(),
             substeps: 0,
             rejected: 0,
             newton: 0,
             incidents: 0,
+            kinds: BTreeMap::new(),
             first_incident: String::new(),
             strain_error: 0.0,
             budget,
@@ -69,6 +77,9 @@ impl Session {
         self.newton += u64::from(report.newton_iterations);
         self.strain_error = self.strain_error.max(report.length_error);
         self.incidents += report.incidents.len() as u64;
+        for incident in &report.incidents {
+            *self.kinds.entry(kind(&incident.kind)).or_default() += 1;
+        }
         if let (true, Some(i)) = (self.first_incident.is_empty(), report.incidents.first()) {
             self.first_incident = format!("{:.4} s: {}", i.time, i.kind);
         }
@@ -89,6 +100,17 @@ impl Session {
     /// Solver time of all frames \[s\].
     pub fn solver_s(&self) -> f64 {
         self.ms.iter().sum::<f64>() / 1e3
+    }
+
+    /// The worst frame \[ms\].
+    pub fn worst(&self) -> f64 {
+        self.ms.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Incidents by kind in words.
+    pub fn incidents_in_words(&self) -> String {
+        let kinds: Vec<String> = self.kinds.iter().map(|(kind, n)| format!("{kind} {n}")).collect();
+        if kinds.is_empty() { "none".into() } else { kinds.join(", ") }
     }
 
     /// Largest strain of an element over every accepted substep.

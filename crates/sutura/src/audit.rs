@@ -1,8 +1,9 @@
 //! The independent audit: did anything pass through anything, how near did things come, how far did threads stretch.
 //!
 //! It looks only at positions at accepted states, with its own distances and its own search for near pairs, so that it cannot share a
-//! mistake with the contact code. Between two states it takes every particle to move along a straight line (for a shape: a straight line
-//! as seen from the shape).
+//! mistake with the contact code. Between two states it takes every particle to move along a straight line. For a shape that turns that can be a
+//! straight line as seen from the shape or from the world: only what crosses on both ways has passed through. (Between two states it turns by
+//! far less than a right angle; where it does not, the two ways have little to do with each other.)
 //!
 //! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements with less than
 //!   `pi r` of thread between them are left out.
@@ -144,6 +145,10 @@ struct RodSlice<'a> {
 
 /// Centerlines nearer than this part of the radius have crossed.
 const TOUCHING: f64 = 1e-3;
+/// A way as seen from a shape that turns counts as straight where it is off by this part of the radius, in at most [`MOST_PIECES`] pieces.
+const STRAIGHT: f64 = 1e-2;
+/// See [`STRAIGHT`]: enough for half a turn of a shape of a hundred radii.
+const MOST_PIECES: f64 = 256.0;
 
 impl Audit {
     /// The number of passages that are listed one by one.
@@ -366,37 +371,44 @@ fn thread_pair(report: &mut AuditReport, now: &Frame, before: &Frame, time: f64,
 #[allow(clippy::too_many_arguments)] // One state of an element and one of a shape, now and before.
 fn thread_and_shape(report: &mut AuditReport, time: f64, rod: &SeenRod, e: usize, now: &Frame, before: &Frame, shape: &SeenShape, old_pose: Option<Pose>) {
     let seen_from = |pose: &Pose, x: [DVec3; 2]| x.map(|x| pose.inverse_transform_point(x));
-    let p = seen_from(&shape.pose, now.element(rod, e));
-    let old = before.element_before(rod, e).zip(old_pose).map_or(p, |(x, pose)| seen_from(&pose, x));
-    let rate = p[0].distance(old[0]).max(p[1].distance(old[1]));
+    let x = now.element(rod, e);
+    let p = seen_from(&shape.pose, x);
     let near = near_shape(report, rod.radius);
     let what = Pair::Shape { thread: (rod.slot, e), shape: shape.slot };
-    let mut look = |d: f64, limit: f64, swept: &dyn Fn(f64) -> f64| {
-        let clearance = (d - rod.radius) / (2.0 * rod.radius);
-        if clearance < report.shape_clearance.unwrap_or(1.0) {
-            report.shape_clearance = Some(clearance);
-            report.shape_closest = Some(Closest { clearance, time, what });
-        }
-        let crosses = d - rate <= limit && time_within(&swept, rate, limit, TOUCHING * rod.radius).is_some();
-        if crosses {
+    let d = shape.distance(p, near);
+    let clearance = (d - rod.radius) / (2.0 * rod.radius);
+    if clearance < report.shape_clearance.unwrap_or(1.0) {
+        report.shape_clearance = Some(clearance);
+        report.shape_closest = Some(Closest { clearance, time, what });
+    }
+    let Some((old_x, old_pose)) = before.element_before(rod, e).zip(old_pose) else {
+        if shape.crosses(p, p, rod.radius) {
             report.cross(time, what);
         }
-        crosses
+        return;
     };
-    if let Geometry::Mesh { vertices, triangles } = &shape.geometry {
-        let reach = Aabb::around(&p).union(&Aabb::around(&old)).grown(near);
-        shape.triangles.tree.any(&reach, &mut |k| {
-            let corners = triangles[shape.triangles.order[k] as usize].map(|v| vertices[v as usize]);
-            // One passage an element is enough.
-            look(segment_triangle(p, corners), TOUCHING * rod.radius, &|t| segment_triangle(lerp(old, p, t), corners))
-        });
-    } else {
-        let middle = 0.5 * (p[0] + p[1]);
-        if segment_solid([middle, middle], &shape.geometry) - 0.5 * p[0].distance(p[1]) > near.max(rate) {
-            return;
-        }
-        look(segment_solid(p, &shape.geometry), 0.0, &|t| segment_solid(lerp(old, p, t), &shape.geometry));
+    let old = seen_from(&old_pose, old_x);
+    if shape.crosses(old, p, rod.radius) && crosses_in_the_world(shape, &old_pose, old_x, x, rod.radius) {
+        report.cross(time, what);
     }
+}
+
+/// Whether a thread crosses a shape that turns when it is the thread that moves along a straight line, as seen from the world. By then it was seen to
+/// cross along a straight line as seen from the shape. What the way between two states was nobody knows: of a thread at rest the one is off by the
+/// height of the arc that the shape turns by, of a thread that is taken along the other.
+fn crosses_in_the_world(shape: &SeenShape, old_pose: &Pose, old_x: [DVec3; 2], x: [DVec3; 2], radius: f64) -> bool {
+    let angle = log((shape.pose.orientation * old_pose.orientation.conjugate()).normalize()).length();
+    let far = x.iter().map(|x| x.distance(shape.pose.position)).chain(old_x.iter().map(|x| x.distance(old_pose.position))).fold(0.0, f64::max);
+    let moved = x.iter().zip(&old_x).map(|(x, old)| ((*x - *old) - (shape.pose.position - old_pose.position)).length()).fold(0.0, f64::max);
+    // Height of the arc: an eighth of the acceleration in the turning frame.
+    let arc = 0.125 * angle * (angle * far + 2.0 * moved);
+    let pieces = (arc / (STRAIGHT * radius)).sqrt().ceil().clamp(1.0, MOST_PIECES);
+    let at = |i: f64| {
+        let t = i / pieces;
+        let pose = old_pose.interpolate(&shape.pose, t);
+        lerp(old_x, x, t).map(|x| pose.inverse_transform_point(x))
+    };
+    (0..pieces as u32).any(|i| shape.crosses(at(f64::from(i)), at(f64::from(i) + 1.0), radius))
 }
 
 impl SeenShape {
@@ -415,6 +427,41 @@ impl SeenShape {
             }
         };
         SeenShape { slot: shape.slot, pose: shape.pose, geometry: shape.geometry.clone(), bounds, triangles, alive: true }
+    }
+
+    /// Distance of an element in the shape's frame from its surface, negative inside a solid; of a mesh no more than `near` is looked for.
+    fn distance(&self, p: [DVec3; 2], near: f64) -> f64 {
+        let Geometry::Mesh { vertices, triangles } = &self.geometry else {
+            let middle = 0.5 * (p[0] + p[1]);
+            let least = segment_solid([middle, middle], &self.geometry) - 0.5 * p[0].distance(p[1]);
+            return if least > near { least } else { segment_solid(p, &self.geometry) };
+        };
+        let mut least = f64::INFINITY;
+        self.triangles.tree.any(&Aabb::around(&p).grown(near), &mut |k| {
+            least = segment_triangle(p, triangles[self.triangles.order[k] as usize].map(|v| vertices[v as usize])).min(least);
+            false
+        });
+        least
+    }
+
+    /// Whether an element whose ends move along straight lines in the shape's frame crosses it: comes inside a solid, or onto the surface of a mesh.
+    fn crosses(&self, old: [DVec3; 2], p: [DVec3; 2], radius: f64) -> bool {
+        let rate = p[0].distance(old[0]).max(p[1].distance(old[1]));
+        let limit = TOUCHING * radius;
+        let within = |limit: f64, distance: &dyn Fn([DVec3; 2]) -> f64| {
+            distance(p) - rate <= limit && time_within(&|t| distance(lerp(old, p, t)), rate, limit, TOUCHING * radius).is_some()
+        };
+        let Geometry::Mesh { vertices, triangles } = &self.geometry else {
+            let middle = 0.5 * (p[0] + p[1]);
+            // The middle of an element that goes inside is this near the surface now.
+            let outside = segment_solid([middle, middle], &self.geometry) - 0.5 * p[0].distance(p[1]) > rate;
+            return !outside && within(0.0, &|p| segment_solid(p, &self.geometry));
+        };
+        let reach = Aabb::around(&p).union(&Aabb::around(&old)).grown(limit);
+        self.triangles.tree.any(&reach, &mut |k| {
+            let corners = triangles[self.triangles.order[k] as usize].map(|v| vertices[v as usize]);
+            within(limit, &|p| segment_triangle(p, corners))
+        })
     }
 
     /// Whether this is the geometry known. A mesh is known by its size and its ends, as comparing all of it at each state would cost

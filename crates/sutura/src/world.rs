@@ -762,9 +762,11 @@ impl World {
     /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
     fn report_teleports(&self, dt: f64, report: &mut StepReport) {
         const FASTEST: f64 = 100.0;
-        let grips = self.state.grips.iter().map(|(_, g)| (g.target.position - g.pose.position).length());
-        let shapes =
-            self.model.shapes.iter().map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
+        // What a force moves has no target; the one that it had stays behind.
+        let led = self.state.grips.iter().filter(|(_, g)| g.drive == Drive::Pose);
+        let grips = led.map(|(_, g)| (g.target.position - g.pose.position).length());
+        let driven = self.model.shapes.iter().filter(|(_, s)| s.motion == ShapeMotion::Driven);
+        let shapes = driven.map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
         for distance in grips.chain(shapes).filter(|d| *d > FASTEST * dt) {
             report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
         }

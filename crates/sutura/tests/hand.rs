@@ -4,7 +4,7 @@ mod support;
 
 use support::t1;
 use sutura::glam::DVec3;
-use sutura::{Drive, Grip, GripSpec, Handle, Hold, Material, Place, Rod, RodSpec, Settings, World};
+use sutura::{Drive, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, World};
 
 const DT: f64 = 1.0 / 60.0;
 const HOLDS: [Hold; 3] = [Hold::Pin, Hold::Clamp, Hold::Jaw];
@@ -24,6 +24,18 @@ fn steps(world: &mut World, n: u32) {
         let report = world.step(DT);
         assert!(report.incidents.is_empty() && report.converged, "{report:?}");
     }
+}
+
+/// A jump is a distance of 100 m/s in a step, from where it is to where it was to be led: what a force has taken farther than that was led nowhere.
+#[test]
+fn what_a_force_takes_far_has_not_jumped() {
+    let (mut world, _, hand) = led(Hold::Pin, DVec3::X, 1.0, 2.0);
+    let motion = ShapeMotion::Pushed { direction: DVec3::Y, force: 1.0, speed_limit: 2.0 };
+    let ball = ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Y)) };
+    let ball = world.insert_shape(&ball).unwrap();
+    steps(&mut world, 90);
+    assert!(world.grip_pose(hand).unwrap().position.x > 100.0 * DT);
+    assert!(world.shape(ball).unwrap().pose.position.y > 1.0 + 100.0 * DT);
 }
 
 #[test]

@@ -608,6 +608,11 @@ impl Stage {
             knots.clear();
         }
     }
+    /// What the steps of a frame, or of a part of it, said.
+    pub fn see(&mut self, report: &FrameReport) {
+        self.last = report.clone();
+        self.least = (lesser(self.least.0, report.thread_clearance), lesser(self.least.1, report.shape_clearance));
+    }
     /// Least clearances so far, by the audit where it runs.
     pub fn clearances(&self) -> (Option<f64>, Option<f64>) {
         self.judge.clearances().unwrap_or(self.least)

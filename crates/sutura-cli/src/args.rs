@@ -189,7 +189,10 @@ Examples:
   sutura knot out/square_knot/trajectory.sutura --time 4.5 --ends held
   sutura knot thread.csv --expect square
 
-Exit codes: 0 recognized (or as expected); 1 not what `--expect` wants; 2 the file could not be read.")]
+A knot that is certain but has no name here is called `unnamed`, with the invariants that it has; one that is not certain `unknown`, with those of most views.
+
+Exit codes: 0 recognized (or as expected); 1 not what `--expect` wants; 2 the file could not be read; without `--expect` also 3 certain, but without a \
+name here; 4 not certain.")]
 pub struct Knot {
     /// Table of points (CSV) or trajectory
     pub file: PathBuf,

@@ -288,7 +288,7 @@ fn summary(r: &Report) -> String {
         let knot = t
             .knot
             .as_ref()
-            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.name, form(k), k.determinant, k.signature, k.agreed, k.tried));
+            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.knot, form(k), k.determinant, k.signature, k.agreed, k.tried));
         threads.add_row([
             t.name.clone(),
             t.elements.to_string(),
@@ -304,7 +304,7 @@ fn summary(r: &Report) -> String {
     }
     let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
     for p in &r.phases {
-        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.name, form(k))).collect();
+        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.knot, form(k))).collect();
         phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
     }
     if !r.phases.is_empty() {

@@ -231,6 +231,46 @@ fn knots_of_the_reference_polylines() {
     assert!(text(&out.stdout).contains("determinant 9"));
 }
 
+/// A curve on a torus that goes round so often along it and across it, forty points each time; closed.
+fn torus_knot(along: u32, across: u32) -> String {
+    let n = 40 * across.max(along);
+    let point = |k: u32| {
+        let t = f64::from(k) / f64::from(n) * std::f64::consts::TAU;
+        let (a, b) = (t * f64::from(along), t * f64::from(across));
+        format!("{},{},{}\n", (2.0 + b.cos()) * a.cos(), (2.0 + b.cos()) * a.sin(), b.sin())
+    };
+    (0..n).map(point).collect()
+}
+
+#[test]
+fn a_knot_without_a_name_is_told_from_one_that_is_not_certain() {
+    let folder = tempfile::tempdir().unwrap();
+    let knot = |args: &[&str]| {
+        let out = sutura(folder.path(), &[&["knot", "points.csv"], args].concat());
+        (out.status.code(), text(&out.stdout))
+    };
+    // The torus knot of 13 crossings: no knot of the tables has as many. Its determinant is 13, its signature 12.
+    std::fs::write(folder.path().join("points.csv"), torus_knot(2, 13)).unwrap();
+    let (code, words) = knot(&["--closed"]);
+    assert!(code == Some(3) && words.starts_with("certain, but no knot that has a name here (unnamed)") && words.contains("determinant 13"), "{words}");
+    let (code, json) = knot(&["--closed", "--json"]);
+    let answer: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, answer["knot"].as_str(), answer["certain"].as_bool(), answer["determinant"].as_u64()), (Some(3), Some("unnamed"), Some(true), Some(13)));
+    assert_eq!(answer["signature"].as_i64().map(i64::abs), Some(12));
+    assert_eq!((knot(&["--closed", "--expect", "unnamed"]).0, knot(&["--closed", "--expect", "unknown"]).0), (Some(0), Some(1)));
+    // A trefoil cut where its end lies in a loop: some closures are knots and some are not.
+    let trefoil = torus_knot(2, 3);
+    let cut: Vec<&str> = trefoil.lines().collect();
+    std::fs::write(folder.path().join("points.csv"), cut[..cut.len() * 84 / 100].join("\n")).unwrap();
+    let unsure: Vec<String> = (0..10).map(|s| s.to_string()).filter(|s| knot(&["--seed", s]).0 == Some(4)).collect();
+    let seed = unsure.first().expect("for most seeds the closures disagree");
+    let (_, words) = knot(&["--seed", seed]);
+    assert!(words.starts_with("not certain (unknown)") && words.contains("Disagreement"), "{words}");
+    let answer: serde_json::Value = serde_json::from_str(&knot(&["--seed", seed, "--json"]).1).unwrap();
+    assert_eq!((answer["knot"].as_str(), answer["certain"].as_bool()), (Some("unknown"), Some(false)));
+    assert_eq!((knot(&["--seed", seed, "--expect", "unknown"]).0, knot(&["--seed", seed, "--expect", "unnamed"]).0), (Some(0), Some(1)));
+}
+
 #[test]
 fn scenes_are_listed_shown_and_copied_but_not_over_a_file() {
     let folder = tempfile::tempdir().unwrap();

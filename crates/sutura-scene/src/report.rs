@@ -156,15 +156,19 @@ pub struct ThreadReport {
     /// Largest tension of an element at any frame's end \[N\].
     #[serde(rename = "max_tension_N")]
     pub max_tension_n: f64,
-    /// Recognised knot at the end: `unknot`, `trefoil`, ... or `unknown`; `None` when recognition was not asked for.
+    /// Recognised knot at the end; `None` when recognition was not asked for.
     pub knot: Option<KnotReport>,
 }
 
 /// A recognised knot and how sure that is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KnotReport {
-    /// Name of the knot, or `unknown`.
-    pub name: String,
+    /// Name of the knot; `unnamed` when it is certain and has none here, `unknown` when it is not certain.
+    #[serde(alias = "name")]
+    pub knot: String,
+    /// Whether enough views and closures agree: the invariants are those of the knot, named or not.
+    #[serde(default)]
+    pub certain: bool,
     /// Knot determinant.
     pub determinant: u64,
     /// Knot signature.

@@ -158,7 +158,7 @@ impl<'d> Loader<'d> {
                 let text = v.text()?.into_owned();
                 let (no_such, names) = match that.reads() {
                     Some(Read::Form) => ("no form of a knot", [&sutura::knot::Verdict::NAMES[..], &["none"]].concat()),
-                    _ => ("no knot", [&sutura::knot::KnotType::NAMES[..], &["unknown"]].concat()),
+                    _ => ("no knot", [&sutura::knot::KnotType::NAMES[..], &["unnamed", "unknown"]].concat()),
                 };
                 if !names.iter().any(|n| texts_match(n, &text)) {
                     v.problem(format!("{no_such} is called `{text}`"), suggest(&text, names));

@@ -1,7 +1,7 @@
 //! The command `sutura knot`: which knot is it?
 
 use crate::args::{EndsOption, Knot};
-use crate::{say, say_json};
+use crate::{FAILS, HOLDS, say, say_json};
 use anyhow::{Context as _, bail};
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, Form, KnotType, Verdict, form, recognize};

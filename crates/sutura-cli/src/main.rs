@@ -6,6 +6,7 @@ mod export;
 mod knot;
 mod knot_strength;
 mod map;
+mod output;
 mod paper;
 mod plot;
 mod presets;

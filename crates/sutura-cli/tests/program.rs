@@ -271,6 +271,99 @@ fn a_knot_without_a_name_is_told_from_one_that_is_not_certain() {
     assert_eq!((knot(&["--seed", seed, "--expect", "unknown"]).0, knot(&["--seed", seed, "--expect", "unnamed"]).0), (Some(0), Some(1)));
 }
 
+/// What is recognized is under the same keys in the report and in what `sutura knot` prints.
+#[test]
+fn a_knot_has_one_key_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let settings = ["--set", "thread.thread.knot=true", "--set", "phase.fall.knot=true"];
+    let out = sutura(folder.path(), &[&["run", "swing.toml", "--quiet", "--no-plots", "--no-stills"], &settings[..]].concat());
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("out/swing/report.json")).unwrap()).unwrap();
+    let printed = sutura(folder.path(), &["knot", "out/swing/trajectory.sutura", "--json"]);
+    let printed: serde_json::Value = serde_json::from_slice(&printed.stdout).unwrap();
+    for found in [&report["threads"][0]["knot"], &report["phases"][0]["knots"][0][1], &printed] {
+        assert_eq!((found["knot"].as_str(), found["certain"].as_bool()), (Some("unknot"), Some(true)), "{found}");
+        assert_eq!((found["determinant"].as_u64(), found["signature"].as_i64()), (Some(1), Some(0)), "{found}");
+        assert!(found.get("name").is_none() && found.get("form").is_some(), "{found}");
+    }
+    assert_eq!((&report["finished"], &report["passed"]), (&true.into(), &true.into()));
+}
+
+#[test]
+fn an_interrupted_run_leaves_no_report_and_keeps_others_out_only_while_it_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let files = ["--quiet", "--no-plots", "--no-stills", "--out", "results"];
+    let run = |more: &[&str]| sutura(folder.path(), &[&["run", "swing.toml"], &files[..], more].concat());
+    assert_eq!(run(&[]).status.code(), Some(0));
+    let report = folder.path().join("results/report.json");
+    std::fs::write(folder.path().join("results/swing.glb"), "an export").unwrap();
+    assert!(report.is_file());
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sutura"));
+    let mut long = command.args(["run", "swing.toml", "--set", "phase.fall.duration=100000 s"]).args(files).current_dir(folder.path()).spawn().unwrap();
+    let begun = std::time::Instant::now();
+    while report.exists() && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(!report.exists(), "what passed before does not pass for this run");
+    let second = run(&[]);
+    assert_eq!(second.status.code(), Some(2));
+    assert!(text(&second.stderr).contains("another run is writing into results"), "{}", text(&second.stderr));
+    assert!(long.try_wait().unwrap().is_none(), "the run goes on");
+    // Harder than by Ctrl-C, which whoever starts the tests may have switched off.
+    long.kill().unwrap();
+    assert!(!long.wait().unwrap().success());
+    assert!(!report.exists() && !folder.path().join("results/trajectory.sutura").exists());
+
+    assert_eq!(run(&[]).status.code(), Some(0));
+    assert!(report.is_file() && folder.path().join("results/swing.glb").is_file());
+}
+
+/// A limit on the size of a file stands for a full disk: some of the results can be written and some cannot.
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_no_report_and_no_file_that_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let run = ["run", "swing.toml", "--picture-size", "96x72", "--no-trajectory", "--out", "results"];
+    assert_eq!(sutura(folder.path(), &run).status.code(), Some(0));
+    let limited = format!("trap '' XFSZ; ulimit -f 8; exec '{}' {}", env!("CARGO_BIN_EXE_sutura"), run.join(" "));
+    let out = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
+    let error = text(&out.stderr);
+    assert!(out.status.code() == Some(2) && error.contains("no report") && error.contains("cannot write results"), "{error}");
+    let results = folder.path().join("results");
+    assert!(!results.join("report.json").exists() && results.join("series/frame.csv").is_file());
+    for file in ["plots", "series", "stills"].iter().filter_map(|f| std::fs::read_dir(results.join(f)).ok()).flatten() {
+        let path = file.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        let whole = match path.extension().and_then(|e| e.to_str()) {
+            Some("svg") => bytes.trim_ascii_end().ends_with(b"</svg>"),
+            Some("png") => bytes.ends_with(b"IEND\xaeB`\x82"),
+            Some("csv") => bytes.ends_with(b"\n"),
+            _ => false,
+        };
+        assert!(whole, "{}", path.display());
+    }
+    assert_eq!(sutura(folder.path(), &run).status.code(), Some(0));
+    assert!(results.join("report.json").is_file());
+}
+
+#[test]
+fn a_folder_with_files_of_somebody_else_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    std::fs::write(folder.path().join("report.json"), "{ \"mine\": true }").unwrap();
+    let out = sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("report.json is not of an earlier run"), "{}", text(&out.stderr));
+    assert_eq!(std::fs::read_to_string(folder.path().join("report.json")).unwrap(), "{ \"mine\": true }");
+    std::fs::remove_file(folder.path().join("report.json")).unwrap();
+    assert_eq!(sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."]).status.code(), Some(0));
+    assert!(folder.path().join("swing.toml").is_file() && folder.path().join("report.json").is_file());
+}
+
 #[test]
 fn scenes_are_listed_shown_and_copied_but_not_over_a_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -104,7 +104,9 @@ pub struct Report {
     pub work: WorkReport,
     /// Each phase that was begun.
     pub phases: Vec<PhaseReport>,
-    /// Whether every check passed and no phase ran out of time (where running out is a failure).
+    /// Whether the run came to its end; not when it was stopped before.
+    pub finished: bool,
+    /// Whether it came to its end, every check passed and no phase ran out of time (where running out is a failure).
     pub passed: bool,
 }
 
@@ -321,7 +323,7 @@ pub struct PhaseReport {
     pub start_s: f64,
     /// When it ended \[s\]; the end of the run when it did not.
     pub end_s: f64,
-    /// `duration`, `condition`, `motions done`, or `out of time`.
+    /// `duration`, `condition`, `motions done`, `out of time`, `given up`, or `stopped`.
     pub ended_by: String,
     /// Whether the scene wants a still picture of its end.
     #[serde(default)]

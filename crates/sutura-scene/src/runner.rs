@@ -651,7 +651,7 @@ impl Runner {
 
     // ---- the end ----
 
-    /// Ends the run (early or not) and hands over what it found.
+    /// Ends the run (early or not) and hands over what it found. A run that is ended early has not passed.
     pub fn finish(mut self) -> Outcome {
         if !self.finished {
             self.end_phase("stopped", false);
@@ -698,7 +698,8 @@ impl Runner {
             passes_through: self.stage.judge.passes_through(),
             passages,
             probes,
-            passed: checks.iter().all(|c| c.passed) && !self.late,
+            finished: self.finished,
+            passed: self.finished && checks.iter().all(|c| c.passed) && !self.late,
             checks,
             warnings: self.warnings,
             incidents: self.incidents.into_iter().map(|(_, r)| r).collect(),

@@ -164,6 +164,15 @@ fn a_phase_without_a_condition_steps_whole_frames() {
 }
 
 #[test]
+fn a_run_that_is_stopped_has_not_passed() {
+    let text = format!("{HANGING}\n[[phase]]\nduration = \"1 s\"\n");
+    let mut runner = Runner::new(Scene::parse(&text, "test.toml").unwrap()).unwrap();
+    runner.step_frame();
+    let report = runner.finish().report;
+    assert_eq!((report.finished, report.passed, report.phases[0].ended_by.as_str()), (false, false, "stopped"));
+}
+
+#[test]
 fn running_out_of_time_fails_the_run_unless_accepted() {
     for (late, passed, phases) in [("fail", false, 2), ("stop", false, 1), ("accept", true, 2)] {
         let out = run(&format!(

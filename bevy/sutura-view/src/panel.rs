@@ -75,7 +75,7 @@ pub fn recognize_knots(
         .map(|(prop, strand)| {
             // In a scene that is played it is known which ends are held.
             let name = match live {
-                Some(play) => play.0.knot(prop.0).name,
+                Some(play) => play.0.knot(prop.0).knot,
                 None if strand.positions.len() < 3 => return (prop.0, String::new()),
                 None => recognize(&strand.positions, if strand.skin.seam.is_some() { Ends::Closed } else { Ends::Free }, 1).to_string(),
             };

@@ -24,7 +24,7 @@ Examples:
   sutura export overhand --out overhand.glb
                                 a film for Blender, a browser or a game engine
 
-Exit codes: 0 all is well; 1 a check of the scene failed; 2 the input could not be used.";
+Exit codes: 0 all is well; 1 a check of the scene failed; 2 the input could not be used, or the results not be written. `sutura knot` has two more.";
 
 /// The commands.
 #[derive(Subcommand, Debug)]
@@ -83,7 +83,8 @@ The folder then holds:
   stills/*.png        pictures of the whole thread and of its knot
   trajectory.sutura   positions and orientations of every recorded frame
   input.sutura        with --record: what was done to the world, for `sutura replay`
-Files that an earlier run left in the same folder are replaced.
+Results of an earlier run in the same folder are removed before the run begins, and nothing else is: where a file of somebody else is in the \
+way, the run is refused, and so is one while another writes there. The report is written last: a folder without one is of a run that did not end.
 
 Examples:
   sutura run square_knot                       a built-in scene, by name
@@ -93,7 +94,7 @@ Examples:
                                                a scene with other values
   sutura run overhand --quiet && echo tied     for scripts
 
-Exit codes: 0 every check holds; 1 a check failed; 2 the scene could not be read.")]
+Exit codes: 0 every check holds; 1 a check failed; 2 the scene could not be read, or the results not be written.")]
 pub struct Run {
     /// Scene file, or the name of a built-in scene
     #[arg(value_name = "SCENE", default_value = "square_knot")]
@@ -189,7 +190,10 @@ Examples:
   sutura knot out/square_knot/trajectory.sutura --time 4.5 --ends held
   sutura knot thread.csv --expect square
 
-Exit codes: 0 recognized (or as expected); 1 not what `--expect` wants; 2 the file could not be read.")]
+A knot that is certain but has no name here is called `unnamed`, with the invariants that it has; one that is not certain `unknown`, with those of most views.
+
+Exit codes: 0 recognized (or as expected); 1 not what `--expect` wants; 2 the file could not be read; without `--expect` also 3 certain, but without a \
+name here; 4 not certain.")]
 pub struct Knot {
     /// Table of points (CSV) or trajectory
     pub file: PathBuf,

@@ -1,7 +1,7 @@
 //! The command `sutura knot`: which knot is it?
 
 use crate::args::{EndsOption, Knot};
-use crate::{say, say_json};
+use crate::{FAILS, HOLDS, say, say_json};
 use anyhow::{Context as _, bail};
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, Form, KnotType, Verdict, form, recognize};
@@ -16,6 +16,7 @@ struct Answer<'a> {
     thread: Option<&'a str>,
     ends: &'static str,
     knot: &'static str,
+    certain: bool,
     title: String,
     prime_parts: &'a str,
     determinant: u64,
@@ -50,10 +51,15 @@ impl From<Form> for Lies {
     }
 }
 
-/// Runs the command; false when the knot is not the one expected.
-pub fn knot(args: &Knot) -> anyhow::Result<bool> {
+/// The knot is certain and has no name here.
+const UNNAMED: u8 = 3;
+/// The knot is not certain.
+const UNCERTAIN: u8 = 4;
+
+/// Runs the command; its exit code.
+pub fn knot(args: &Knot) -> anyhow::Result<u8> {
     if let Some(name) = &args.expect {
-        let known = || KnotType::NAMES.into_iter().chain(["unknown"]);
+        let known = || KnotType::NAMES.into_iter().chain(["unnamed", "unknown"]);
         if !known().any(|n| n == name) {
             let near = crate::nearest(name, known())
                 .map_or_else(|| format!("there are {}", known().collect::<Vec<_>>().join(", ")), |n| format!("did you mean `{n}`?"));
@@ -73,8 +79,13 @@ pub fn knot(args: &Knot) -> anyhow::Result<bool> {
         time_s: curve.time,
         thread: curve.thread.as_deref(),
         ends: how,
-        knot: found.knot.name(),
-        title: found.knot.to_string(),
+        knot: found.name(),
+        certain: found.is_certain(),
+        title: match (found.knot, found.is_certain()) {
+            (KnotType::Unknown, true) => "certain, but no knot that has a name here".into(),
+            (KnotType::Unknown, false) => "not certain".into(),
+            (named, _) => named.to_string(),
+        },
         prime_parts: &found.notation,
         determinant: found.determinant,
         signature: found.signature,
@@ -93,7 +104,13 @@ pub fn knot(args: &Knot) -> anyhow::Result<bool> {
     } else {
         say(&words(&answer))?;
     }
-    Ok(args.expect.as_ref().is_none_or(|name| name == answer.knot))
+    Ok(match &args.expect {
+        Some(name) if name == answer.knot => HOLDS,
+        Some(_) => FAILS,
+        None if !answer.certain => UNCERTAIN,
+        None if found.knot == KnotType::Unknown => UNNAMED,
+        None => HOLDS,
+    })
 }
 
 fn words(a: &Answer<'_>) -> String {

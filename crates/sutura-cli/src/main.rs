@@ -6,6 +6,7 @@ mod export;
 mod knot;
 mod knot_strength;
 mod map;
+mod output;
 mod paper;
 mod plot;
 mod presets;
@@ -29,23 +30,23 @@ const FAILS: u8 = 1;
 const BAD_INPUT: u8 = 2;
 
 fn main() -> ExitCode {
+    let judged = |holds: bool| if holds { HOLDS } else { FAILS };
     let done = match Cli::parse().command {
-        None => run::run(&args::Run::of_sample("square_knot")),
-        Some(Command::Run(a)) => run::run(&a),
-        Some(Command::Scenes(a)) => scenes::scenes(&a).map(|()| true),
+        None => run::run(&args::Run::of_sample("square_knot")).map(judged),
+        Some(Command::Run(a)) => run::run(&a).map(judged),
+        Some(Command::Scenes(a)) => scenes::scenes(&a).map(|()| HOLDS),
         Some(Command::Knot(a)) => knot::knot(&a),
-        Some(Command::KnotStrength(a)) => knot_strength::knot_strength(&a).map(|()| true),
-        Some(Command::Presets(a)) => presets::presets(&a).map(|()| true),
-        Some(Command::Bench(a)) => bench::bench(&a).map(|()| true),
-        Some(Command::Validate(a)) => validate::validate(&a),
-        Some(Command::Paper(a)) => paper::paper(&a),
-        Some(Command::Replay(a)) => replay::replay(&a),
-        Some(Command::Export(a)) => export::export(&a).map(|()| true),
-        Some(Command::View(a)) => view::view(&a),
+        Some(Command::KnotStrength(a)) => knot_strength::knot_strength(&a).map(|()| HOLDS),
+        Some(Command::Presets(a)) => presets::presets(&a).map(|()| HOLDS),
+        Some(Command::Bench(a)) => bench::bench(&a).map(|()| HOLDS),
+        Some(Command::Validate(a)) => validate::validate(&a).map(judged),
+        Some(Command::Paper(a)) => paper::paper(&a).map(judged),
+        Some(Command::Replay(a)) => replay::replay(&a).map(judged),
+        Some(Command::Export(a)) => export::export(&a).map(|()| HOLDS),
+        Some(Command::View(a)) => view::view(&a).map(judged),
     };
     ExitCode::from(match done {
-        Ok(true) => HOLDS,
-        Ok(false) => FAILS,
+        Ok(code) => code,
         Err(e) if e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) => HOLDS,
         Err(e) => {
             eprintln!("error: {e:#}");

@@ -1,7 +1,7 @@
 //! Maps of marks by row and column, as SVG and PNG.
 
+use crate::output::put;
 use crate::plot::{PNG_SCALE, rasterize};
-use anyhow::Context as _;
 use std::fmt::Write as _;
 use std::path::Path;
 use sutura_paper::Grid;
@@ -30,8 +30,7 @@ pub fn write(grids: &[Grid], stem: &Path) -> anyhow::Result<()> {
         draw(&mut svg, grid, (LEFT + panel.0 * (k % across) as f64, TOP + panel.1 * (k / across) as f64));
     }
     svg.push_str("</svg>\n");
-    let path = stem.with_extension("svg");
-    std::fs::write(&path, &svg).with_context(|| format!("cannot write {}", path.display()))?;
+    put(&stem.with_extension("svg"), svg.as_bytes())?;
     rasterize(&svg, (size.0 as u32, size.1 as u32), PNG_SCALE)?.write(&stem.with_extension("png"))
 }
 

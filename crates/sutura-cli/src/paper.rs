@@ -94,7 +94,7 @@ fn simulate(experiments: &[Experiment], args: &Paper) -> Vec<Result> {
 }
 
 fn put(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    crate::output::put(path, text.as_bytes())
 }
 
 /// Tables, plots and pictures of an experiment.

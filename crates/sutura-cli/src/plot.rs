@@ -1,6 +1,7 @@
 //! Curves over time as SVG, the same turned into PNG, and captions on pictures. Text is set in `DejaVu Sans`, which is part of the
 //! program, so that no font need be installed.
 
+use crate::output::put;
 use crate::still::{Image, Size};
 use anyhow::Context as _;
 use plotters::coord::Shift;
@@ -70,14 +71,19 @@ impl Figure {
 
     /// Writes `<stem>.svg`.
     pub fn write_svg(&self, stem: &Path) -> anyhow::Result<()> {
-        let svg = stem.with_extension("svg");
-        std::fs::write(&svg, self.svg()?).with_context(|| format!("cannot write {}", svg.display()))
+        put(&stem.with_extension("svg"), self.svg()?.as_bytes())
     }
 
     /// Writes `<stem>.png` and `<stem>.svg`.
     pub fn write(&self, stem: &Path) -> anyhow::Result<()> {
-        self.write_svg(stem)?;
-        rasterize(&self.svg()?, (SIZE.width, SIZE.height), PNG_SCALE)?.write(&stem.with_extension("png"))
+        self.files()?.iter().try_for_each(|(ending, bytes)| put(&stem.with_extension(ending), bytes))
+    }
+
+    /// The bytes of both files by their endings.
+    pub fn files(&self) -> anyhow::Result<[(&'static str, Vec<u8>); 2]> {
+        let svg = self.svg()?;
+        let png = rasterize(&svg, (SIZE.width, SIZE.height), PNG_SCALE)?.to_png()?;
+        Ok([("svg", svg.into_bytes()), ("png", png)])
     }
 
     fn svg(&self) -> anyhow::Result<String> {

@@ -32,7 +32,7 @@ pub fn replay(args: &Replay) -> anyhow::Result<bool> {
         if over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     if let Some(path) = &args.state {
-        std::fs::write(path, numbers(&world)).with_context(|| format!("cannot write {}", path.display()))?;
+        crate::output::put(path, numbers(&world).as_bytes())?;
     }
     match differs {
         None if args.quiet => {}

@@ -1,12 +1,13 @@
 //! The command `sutura run`: step a scene to its end, write what it left behind, and say how it went.
 
 use crate::args::Run;
+use crate::output::{Folder, REPORT};
 use crate::plot::{Figure, Line, caption};
 use crate::still::{self, Camera, Look, Size, Solid, Subject, Tube};
 use crate::{say, scenes, table};
 use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::{Duration, Instant};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{Geometry, Pose};
@@ -23,13 +24,13 @@ impl Run {
 pub fn run(args: &Run) -> anyhow::Result<bool> {
     let scene = load(&args.scene, &args.settings)?;
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(scene.name()));
-    if !args.dry {
-        // Before the work, so that a folder that cannot be written is found at once.
-        std::fs::create_dir_all(&folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
-    }
-    let outcome = simulate(if args.record { Runner::recording(scene.clone())? } else { Runner::new(scene.clone())? }, args.quiet);
-    if !args.dry {
-        write(&outcome, &scene, &folder, args)?;
+    let runner = if args.record { Runner::recording(scene.clone())? } else { Runner::new(scene.clone())? };
+    let saves: Vec<String> = scene.saves().map(file_name).collect();
+    // Before the work, so that a folder that cannot be written is found at once, and an earlier run cannot pass for this one.
+    let mut results = if args.dry { None } else { Some(Folder::open(&folder, scene.start(), &saves)?) };
+    let outcome = simulate(runner, args.quiet);
+    if let Some(results) = &mut results {
+        write(&outcome, &scene, results, args).with_context(|| format!("the results in {} are not complete, and there is no report", folder.display()))?;
     }
     if !args.quiet {
         say(&summary(&outcome.report))?;
@@ -83,55 +84,31 @@ pub fn simulate(mut runner: Runner, quiet: bool) -> Outcome {
     runner.finish()
 }
 
-fn write(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow::Result<()> {
-    let put = |path: &Path, bytes: &[u8]| std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()));
-    let subfolder = |name: &str| -> anyhow::Result<PathBuf> {
-        let path = folder.join(name);
-        std::fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
-        Ok(path)
-    };
-    clear(folder);
-    put(&folder.join("report.json"), &serde_json::to_vec_pretty(&outcome.report)?)?;
-    let series_folder = subfolder("series")?;
+fn write(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run) -> anyhow::Result<()> {
     for series in &outcome.series {
-        put(&series_folder.join(format!("{}.csv", file_name(&series.name))), series.to_csv().as_bytes())?;
+        folder.write(&format!("series/{}.csv", file_name(&series.name)), series.to_csv().as_bytes())?;
     }
     for state in &outcome.saved {
-        put(&folder.join(file_name(&state.name)), &state.bytes)?;
+        folder.write(&file_name(&state.name), &state.bytes)?;
     }
     if let Some(input) = &outcome.input {
-        put(&folder.join("input.sutura"), &input.to_bytes())?;
+        folder.write("input.sutura", &input.to_bytes())?;
     }
     if !args.no_trajectory {
-        let path = folder.join("trajectory.sutura");
-        outcome.trajectory.write_to(&path).with_context(|| format!("cannot write {}", path.display()))?;
+        folder.write("trajectory.sutura", &outcome.trajectory.to_bytes())?;
     }
     if !args.no_plots {
-        let plots = subfolder("plots")?;
         for (name, figure) in figures(outcome) {
-            figure.write(&plots.join(name))?;
-        }
-    }
-    if !args.no_stills {
-        draw_stills(outcome, scene, &subfolder("stills")?, args)?;
-    }
-    Ok(())
-}
-
-/// Pictures, plots and tables of an earlier run in the same folder would pass for those of this one.
-fn clear(folder: &Path) {
-    if !folder.join("report.json").is_file() {
-        return;
-    }
-    for (name, kinds) in [("series", &["csv"][..]), ("plots", &["png", "svg"]), ("stills", &["png"])] {
-        let Ok(entries) = std::fs::read_dir(folder.join(name)) else { continue };
-        for path in entries.filter_map(|e| e.ok().map(|e| e.path())) {
-            if path.extension().and_then(|e| e.to_str()).is_some_and(|e| kinds.contains(&e)) {
-                // What cannot be removed is overwritten or reported when it is written.
-                let _ = std::fs::remove_file(path);
+            for (ending, bytes) in figure.files()? {
+                folder.write(&format!("plots/{name}.{ending}"), &bytes)?;
             }
         }
     }
+    if !args.no_stills {
+        draw_stills(outcome, scene, folder, args)?;
+    }
+    // Last: whoever finds it finds everything.
+    folder.write(REPORT, &serde_json::to_vec_pretty(&outcome.report)?)
 }
 
 /// A name as a file name on any system, and in this folder.
@@ -218,7 +195,7 @@ fn subject(header: &Header, frame: &Frame) -> Subject {
 }
 
 /// Two pictures at each time: all of the threads, and the knot from near.
-fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> anyhow::Result<()> {
+fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run) -> anyhow::Result<()> {
     let trajectory = &outcome.trajectory;
     let (Some(first), Some(last)) = (trajectory.frames.first(), trajectory.frames.last()) else { return Ok(()) };
     let of_phases: Vec<f64> = outcome.report.phases.iter().filter(|p| p.still).map(|p| p.end_s).collect();
@@ -240,13 +217,13 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> a
         still::best_direction(&at_end, &seen, up)
     });
 
-    let mut drawn: Vec<f64> = Vec::new();
+    let mut drawn: Vec<String> = Vec::new();
     for time in times {
         let Some(frame) = trajectory.nearest(time.min(last.time)) else { continue };
-        if drawn.contains(&frame.time) {
+        let moment = format!("{:08.4}s", frame.time);
+        if drawn.contains(&moment) {
             continue;
         }
-        drawn.push(frame.time);
         let subject = subject(&trajectory.header, frame);
         let radius = subject.tubes.iter().map(|t| t.radius).fold(0.0, f64::max);
         let all: Vec<DVec3> = subject.tubes.iter().flat_map(|t| t.points.iter().copied()).collect();
@@ -260,8 +237,9 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &Path, args: &Run) -> a
             let camera = Camera::fit(&look, points, margin * radius, size);
             let mut image = still::render(&subject, &camera, size);
             caption(&mut image, &format!("{}, {:.3} s", scene.title(), frame.time), camera.width())?;
-            image.write(&folder.join(format!("{:08.4}s{name}.png", frame.time)))?;
+            folder.write(&format!("stills/{moment}{name}.png"), &image.to_png()?)?;
         }
+        drawn.push(moment);
     }
     Ok(())
 }
@@ -288,7 +266,7 @@ fn summary(r: &Report) -> String {
         let knot = t
             .knot
             .as_ref()
-            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.name, form(k), k.determinant, k.signature, k.agreed, k.tried));
+            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.knot, form(k), k.determinant, k.signature, k.agreed, k.tried));
         threads.add_row([
             t.name.clone(),
             t.elements.to_string(),
@@ -304,7 +282,7 @@ fn summary(r: &Report) -> String {
     }
     let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
     for p in &r.phases {
-        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.name, form(k))).collect();
+        let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.knot, form(k))).collect();
         phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
     }
     if !r.phases.is_empty() {

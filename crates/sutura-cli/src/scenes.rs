@@ -22,7 +22,7 @@ pub fn scenes(args: &Scenes) -> anyhow::Result<()> {
             if file.exists() && !force {
                 bail!("{} exists; `--force` replaces it", file.display());
             }
-            std::fs::write(&file, sample.text).with_context(|| format!("cannot write {}", file.display()))?;
+            crate::output::put(&file, sample.text.as_bytes())?;
             say(&format!("wrote {}; run it with `sutura run {}`", file.display(), file.display()))
         }
     }

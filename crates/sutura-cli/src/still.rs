@@ -9,7 +9,6 @@ mod stage;
 
 pub use camera::{Camera, Look, best_direction, knot_region};
 
-use anyhow::Context as _;
 use stage::{Dice, Stage, look_along};
 use std::path::Path;
 use std::sync::Mutex;
@@ -64,11 +63,19 @@ pub struct Image {
 impl Image {
     /// Writes a PNG file.
     pub fn write(&self, path: &Path) -> anyhow::Result<()> {
-        let file = std::fs::File::create(path).with_context(|| format!("cannot write {}", path.display()))?;
-        let mut encoder = png::Encoder::new(std::io::BufWriter::new(file), self.size.width, self.size.height);
+        crate::output::put(path, &self.to_png()?)
+    }
+
+    /// The bytes of a PNG file.
+    pub fn to_png(&self) -> anyhow::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, self.size.width, self.size.height);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
-        encoder.write_header().and_then(|mut w| w.write_image_data(&self.rgb)).with_context(|| format!("cannot write {}", path.display()))
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&self.rgb)?;
+        writer.finish()?;
+        Ok(bytes)
     }
 }
 

@@ -87,7 +87,7 @@ fn simulate(sections: &[Section], args: &Validate) -> Vec<SectionResult> {
 }
 
 fn write(results: &[SectionResult], out: &Path) -> anyhow::Result<()> {
-    let put = |path: &Path, text: &str| std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()));
+    let put = |path: &Path, text: &str| crate::output::put(path, text.as_bytes());
     let folder = out.join("validation");
     put(&out.join("validation.md"), &sutura_validate::markdown(results, "validation"))?;
     put(&folder.join("results.csv"), &sutura_validate::csv(results))?;

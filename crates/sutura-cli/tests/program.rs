@@ -231,6 +231,139 @@ fn knots_of_the_reference_polylines() {
     assert!(text(&out.stdout).contains("determinant 9"));
 }
 
+/// A curve on a torus that goes round so often along it and across it, forty points each time; closed.
+fn torus_knot(along: u32, across: u32) -> String {
+    let n = 40 * across.max(along);
+    let point = |k: u32| {
+        let t = f64::from(k) / f64::from(n) * std::f64::consts::TAU;
+        let (a, b) = (t * f64::from(along), t * f64::from(across));
+        format!("{},{},{}\n", (2.0 + b.cos()) * a.cos(), (2.0 + b.cos()) * a.sin(), b.sin())
+    };
+    (0..n).map(point).collect()
+}
+
+#[test]
+fn a_knot_without_a_name_is_told_from_one_that_is_not_certain() {
+    let folder = tempfile::tempdir().unwrap();
+    let knot = |args: &[&str]| {
+        let out = sutura(folder.path(), &[&["knot", "points.csv"], args].concat());
+        (out.status.code(), text(&out.stdout))
+    };
+    // The torus knot of 13 crossings: no knot of the tables has as many. Its determinant is 13, its signature 12.
+    std::fs::write(folder.path().join("points.csv"), torus_knot(2, 13)).unwrap();
+    let (code, words) = knot(&["--closed"]);
+    assert!(code == Some(3) && words.starts_with("certain, but no knot that has a name here (unnamed)") && words.contains("determinant 13"), "{words}");
+    let (code, json) = knot(&["--closed", "--json"]);
+    let answer: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, answer["knot"].as_str(), answer["certain"].as_bool(), answer["determinant"].as_u64()), (Some(3), Some("unnamed"), Some(true), Some(13)));
+    assert_eq!(answer["signature"].as_i64().map(i64::abs), Some(12));
+    assert_eq!((knot(&["--closed", "--expect", "unnamed"]).0, knot(&["--closed", "--expect", "unknown"]).0), (Some(0), Some(1)));
+    // A trefoil cut where its end lies in a loop: some closures are knots and some are not.
+    let trefoil = torus_knot(2, 3);
+    let cut: Vec<&str> = trefoil.lines().collect();
+    std::fs::write(folder.path().join("points.csv"), cut[..cut.len() * 84 / 100].join("\n")).unwrap();
+    let unsure: Vec<String> = (0..10).map(|s| s.to_string()).filter(|s| knot(&["--seed", s]).0 == Some(4)).collect();
+    let seed = unsure.first().expect("for most seeds the closures disagree");
+    let (_, words) = knot(&["--seed", seed]);
+    assert!(words.starts_with("not certain (unknown)") && words.contains("Disagreement"), "{words}");
+    let answer: serde_json::Value = serde_json::from_str(&knot(&["--seed", seed, "--json"]).1).unwrap();
+    assert_eq!((answer["knot"].as_str(), answer["certain"].as_bool()), (Some("unknown"), Some(false)));
+    assert_eq!((knot(&["--seed", seed, "--expect", "unknown"]).0, knot(&["--seed", seed, "--expect", "unnamed"]).0), (Some(0), Some(1)));
+}
+
+/// What is recognized is under the same keys in the report and in what `sutura knot` prints.
+#[test]
+fn a_knot_has_one_key_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let settings = ["--set", "thread.thread.knot=true", "--set", "phase.fall.knot=true"];
+    let out = sutura(folder.path(), &[&["run", "swing.toml", "--quiet", "--no-plots", "--no-stills"], &settings[..]].concat());
+    assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("out/swing/report.json")).unwrap()).unwrap();
+    let printed = sutura(folder.path(), &["knot", "out/swing/trajectory.sutura", "--json"]);
+    let printed: serde_json::Value = serde_json::from_slice(&printed.stdout).unwrap();
+    for found in [&report["threads"][0]["knot"], &report["phases"][0]["knots"][0][1], &printed] {
+        assert_eq!((found["knot"].as_str(), found["certain"].as_bool()), (Some("unknot"), Some(true)), "{found}");
+        assert_eq!((found["determinant"].as_u64(), found["signature"].as_i64()), (Some(1), Some(0)), "{found}");
+        assert!(found.get("name").is_none() && found.get("form").is_some(), "{found}");
+    }
+    assert_eq!((&report["finished"], &report["passed"]), (&true.into(), &true.into()));
+}
+
+#[test]
+fn an_interrupted_run_leaves_no_report_and_keeps_others_out_only_while_it_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let files = ["--quiet", "--no-plots", "--no-stills", "--out", "results"];
+    let run = |more: &[&str]| sutura(folder.path(), &[&["run", "swing.toml"], &files[..], more].concat());
+    assert_eq!(run(&[]).status.code(), Some(0));
+    let report = folder.path().join("results/report.json");
+    std::fs::write(folder.path().join("results/swing.glb"), "an export").unwrap();
+    assert!(report.is_file());
+
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sutura"));
+    let mut long = command.args(["run", "swing.toml", "--set", "phase.fall.duration=100000 s"]).args(files).current_dir(folder.path()).spawn().unwrap();
+    let begun = std::time::Instant::now();
+    while report.exists() && begun.elapsed().as_secs() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    assert!(!report.exists(), "what passed before does not pass for this run");
+    let second = run(&[]);
+    assert_eq!(second.status.code(), Some(2));
+    assert!(text(&second.stderr).contains("another run is writing into results"), "{}", text(&second.stderr));
+    assert!(long.try_wait().unwrap().is_none(), "the run goes on");
+    // Harder than by Ctrl-C, which whoever starts the tests may have switched off.
+    long.kill().unwrap();
+    assert!(!long.wait().unwrap().success());
+    assert!(!report.exists() && !folder.path().join("results/trajectory.sutura").exists());
+
+    assert_eq!(run(&[]).status.code(), Some(0));
+    assert!(report.is_file() && folder.path().join("results/swing.glb").is_file());
+}
+
+/// A limit on the size of a file stands for a full disk: some of the results can be written and some cannot.
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_no_report_and_no_file_that_is_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    let run = ["run", "swing.toml", "--picture-size", "96x72", "--no-trajectory", "--out", "results"];
+    assert_eq!(sutura(folder.path(), &run).status.code(), Some(0));
+    let limited = format!("trap '' XFSZ; ulimit -f 8; exec '{}' {}", env!("CARGO_BIN_EXE_sutura"), run.join(" "));
+    let out = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
+    let error = text(&out.stderr);
+    assert!(out.status.code() == Some(2) && error.contains("no report") && error.contains("cannot write results"), "{error}");
+    let results = folder.path().join("results");
+    assert!(!results.join("report.json").exists() && results.join("series/frame.csv").is_file());
+    for file in ["plots", "series", "stills"].iter().filter_map(|f| std::fs::read_dir(results.join(f)).ok()).flatten() {
+        let path = file.unwrap().path();
+        let bytes = std::fs::read(&path).unwrap();
+        let whole = match path.extension().and_then(|e| e.to_str()) {
+            Some("svg") => bytes.trim_ascii_end().ends_with(b"</svg>"),
+            Some("png") => bytes.ends_with(b"IEND\xaeB`\x82"),
+            Some("csv") => bytes.ends_with(b"\n"),
+            _ => false,
+        };
+        assert!(whole, "{}", path.display());
+    }
+    assert_eq!(sutura(folder.path(), &run).status.code(), Some(0));
+    assert!(results.join("report.json").is_file());
+}
+
+#[test]
+fn a_folder_with_files_of_somebody_else_is_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    write_swing(folder.path(), "5 mm");
+    std::fs::write(folder.path().join("report.json"), "{ \"mine\": true }").unwrap();
+    let out = sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."]);
+    assert_eq!(out.status.code(), Some(2));
+    assert!(text(&out.stderr).contains("report.json is not of an earlier run"), "{}", text(&out.stderr));
+    assert_eq!(std::fs::read_to_string(folder.path().join("report.json")).unwrap(), "{ \"mine\": true }");
+    std::fs::remove_file(folder.path().join("report.json")).unwrap();
+    assert_eq!(sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."]).status.code(), Some(0));
+    assert!(folder.path().join("swing.toml").is_file() && folder.path().join("report.json").is_file());
+}
+
 #[test]
 fn scenes_are_listed_shown_and_copied_but_not_over_a_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -286,7 +286,7 @@ impl Output {
     /// Writes the file itself, or one in the folder.
     fn write(&mut self, name: Option<&str>, bytes: &[u8]) -> Result<(), ExportError> {
         let path = name.map_or_else(|| self.path.clone(), |name| self.path.join(name));
-        std::fs::write(&path, bytes).map_err(|source| ExportError::Io { path, source })?;
+        crate::whole::write_whole(&path, bytes).map_err(|source| ExportError::Io { path, source })?;
         self.bytes += bytes.len() as u64;
         Ok(())
     }

@@ -131,6 +131,23 @@ enum Node {
     Binary(Op, Box<Node>, Box<Node>),
 }
 
+impl Node {
+    fn probes(&self, found: &mut Vec<usize>) {
+        match self {
+            Node::Constant(_) | Node::Read(..) => {}
+            Node::Probe(i) => {
+                if !found.contains(i) {
+                    found.push(*i);
+                }
+            }
+            Node::Maths(_, nodes) => nodes.iter().for_each(|n| n.probes(found)),
+            Node::Vector(nodes) => nodes.iter().for_each(|n| n.probes(found)),
+            Node::Pick(inner, _) | Node::Negate(inner) | Node::Not(inner) => inner.probes(found),
+            Node::Binary(_, a, b) => [a, b].iter().for_each(|n| n.probes(found)),
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Op {
     Add,
@@ -170,6 +187,10 @@ impl Expr {
             Node::Read(read, _) => Some(*read),
             _ => None,
         }
+    }
+    /// Adds the probes that it names to those found, each once.
+    pub fn probes(&self, found: &mut Vec<usize>) {
+        self.node.probes(found);
     }
     /// Whether it holds (expressions of kind truth).
     pub fn holds(&self, live: &dyn Live) -> bool {

@@ -74,7 +74,8 @@ pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
         (recognition.projections_total, recognition.projections_agreed)
     };
     KnotReport {
-        name: recognition.knot.name().into(),
+        knot: recognition.name().into(),
+        certain: recognition.is_certain(),
         determinant: recognition.determinant,
         signature: i64::from(recognition.signature),
         tried,

@@ -25,6 +25,7 @@ mod table;
 mod trajectory;
 mod units;
 mod watch;
+mod whole;
 
 pub use error::{Problem, SceneError};
 pub use report::{
@@ -37,3 +38,4 @@ pub use scene::{Camera, Mover, Scene};
 pub use table::{TableError, points_from_table};
 pub use trajectory::{Contact, Forces, Frame, Header, OnThread, SectionOutline, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory, TrajectoryError};
 pub use units::in_si;
+pub use whole::{PARTIAL, write_whole};

@@ -50,6 +50,7 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
         grips: Vec::new(),
         loads: Vec::new(),
         phases: Vec::new(),
+        profiles: Vec::new(),
     };
     let scene = loader.scene(&root, file_name);
     root.finish();
@@ -80,6 +81,7 @@ struct Loader<'d> {
     grips: Vec<String>,
     loads: Vec<String>,
     phases: Vec<String>,
+    profiles: Vec<String>,
 }
 
 /// Most substeps of a frame.

@@ -104,7 +104,9 @@ pub struct Report {
     pub work: WorkReport,
     /// Each phase that was begun.
     pub phases: Vec<PhaseReport>,
-    /// Whether every check passed and no phase ran out of time (where running out is a failure).
+    /// Whether the run came to its end; not when it was stopped before.
+    pub finished: bool,
+    /// Whether it came to its end, every check passed and no phase ran out of time (where running out is a failure).
     pub passed: bool,
 }
 
@@ -156,15 +158,19 @@ pub struct ThreadReport {
     /// Largest tension of an element at any frame's end \[N\].
     #[serde(rename = "max_tension_N")]
     pub max_tension_n: f64,
-    /// Recognised knot at the end: `unknot`, `trefoil`, ... or `unknown`; `None` when recognition was not asked for.
+    /// Recognised knot at the end; `None` when recognition was not asked for.
     pub knot: Option<KnotReport>,
 }
 
 /// A recognised knot and how sure that is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KnotReport {
-    /// Name of the knot, or `unknown`.
-    pub name: String,
+    /// Name of the knot; `unnamed` when it is certain and has none here, `unknown` when it is not certain.
+    #[serde(alias = "name")]
+    pub knot: String,
+    /// Whether enough views and closures agree: the invariants are those of the knot, named or not.
+    #[serde(default)]
+    pub certain: bool,
     /// Knot determinant.
     pub determinant: u64,
     /// Knot signature.
@@ -317,7 +323,7 @@ pub struct PhaseReport {
     pub start_s: f64,
     /// When it ended \[s\]; the end of the run when it did not.
     pub end_s: f64,
-    /// `duration`, `condition`, `motions done`, or `out of time`.
+    /// `duration`, `condition`, `motions done`, `out of time`, `given up`, or `stopped`.
     pub ended_by: String,
     /// Whether the scene wants a still picture of its end.
     #[serde(default)]

@@ -1,6 +1,10 @@
 //! Steps a scene frame by frame: phases, motions, probes, checks, recording.
+//!
+//! Probes, checks and the recording look at the ends of frames, whose times are regular. The condition of `until` is judged after every substep,
+//! since much can happen in a frame: where it comes true the phase ends, and what is left of the frame is done under the next one.
 
 use crate::error::SceneError;
+use crate::expr::Expr;
 use crate::report::{
     Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
 };
@@ -23,6 +27,10 @@ pub struct Runner {
     world_start: f64,
     frame: u64,
     phase: usize,
+    /// Whether the phase began within a frame, where a condition ended the one before.
+    phase_within: bool,
+    /// Probes that the condition of the phase reads, in order: each may name those before it.
+    asked: Vec<usize>,
     finished: bool,
     /// Whether a phase that must not ran out of time.
     late: bool,
@@ -104,6 +112,8 @@ impl Runner {
             world_start: stage.world.time(),
             frame: 0,
             phase: 0,
+            phase_within: false,
+            asked: Vec::new(),
             finished: false,
             late: false,
             probes: scene.probes.iter().map(Probe::new).collect(),
@@ -134,7 +144,7 @@ impl Runner {
         Ok(runner)
     }
 
-    /// Simulates one frame. Does nothing once the run is finished.
+    /// Simulates one frame, or what there is of the last one where a condition ends the run within it. Does nothing once the run is finished.
     pub fn step_frame(&mut self) -> Progress {
         self.step_frame_with(&mut |_, _| {})
     }
@@ -145,7 +155,9 @@ impl Runner {
         if !self.finished {
             let (report, cpu, stuck) = self.simulate(drive);
             self.frame += 1;
-            self.stage.time = self.frame as f64 / self.scene.frame_rate;
+            if !self.finished {
+                self.stage.time = self.frame as f64 / self.scene.frame_rate;
+            }
             self.stage.moment_passed();
             self.take_note(&report, cpu);
             self.warn();
@@ -153,7 +165,7 @@ impl Runner {
             self.stuck = if stuck { self.stuck + 1 } else { 0 };
             if self.stuck >= GIVE_UP {
                 self.give_up(format!("given up: {GIVE_UP} frames in a row found no acceptable substep"));
-            } else {
+            } else if !self.finished {
                 self.end_phase_when_due();
                 if !self.finished && self.frame as f64 >= MOST_FRAMES {
                     self.give_up(format!("given up after {MOST_FRAMES:e} frames"));
@@ -209,41 +221,46 @@ impl Runner {
 
     fn give_up(&mut self, why: String) {
         self.incident(None, why);
-        self.end_phase("given up");
+        self.end_phase("given up", false);
         (self.late, self.finished) = (true, true);
     }
 
-    /// Pieces in which a frame is done: what moves is sampled at every substep, so that its path does not depend on the frame rate.
+    /// Pieces in which a frame, or what is left of it, is done: what moves is sampled at every substep, so that its path does not depend on the
+    /// frame rate, and a condition is judged after each.
     fn pieces(&self, dt: f64) -> u32 {
         let substep = self.stage.world.settings().substep;
-        if self.stage.is_driven() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 }
+        if self.stage.is_driven() || self.condition().is_some() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 }
     }
 
     /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.
     fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> (FrameReport, f64, bool) {
         let dt = 1.0 / self.scene.frame_rate;
         let begin = self.frame as f64 * dt;
-        let pieces = self.pieces(dt);
         let mut report = FrameReport { converged: true, ..FrameReport::default() };
         let (mut cpu, mut stuck) = (Duration::ZERO, false);
-        for k in 1..=pieces {
-            let at = begin + dt * f64::from(k) / f64::from(pieces);
-            drive(&mut self.stage.world, f64::from(k) / f64::from(pieces));
+        // Of the frame this was done under phases that ended in it; the rest is done in pieces.
+        let (mut done, mut pieces, mut k) = (0.0, self.pieces(dt), 0);
+        while k < pieces {
+            k += 1;
+            let (rest, part) = (dt - done, f64::from(k) / f64::from(pieces));
+            let (at, piece) = (begin + done + rest * f64::from(k) / f64::from(pieces), rest / f64::from(pieces));
+            let before = done / dt;
+            drive(&mut self.stage.world, if k == pieces { 1.0 } else { before + (1.0 - before) * part });
             let moved = self.stage.drive(at);
-            if let Err(e) = moved.and(self.stage.bring_back(at, dt / f64::from(pieces))) {
+            if let Err(e) = moved.and(self.stage.bring_back(at, piece)) {
                 self.incident(None, e.to_string());
             }
             let Stage { world, judge, .. } = &mut self.stage;
             let mut audited = Duration::ZERO;
             let clock = ThreadTime::now();
             let step = if judge.is_active() {
-                world.step_with(dt / f64::from(pieces), &mut |view| {
+                world.step_with(piece, &mut |view| {
                     let clock = ThreadTime::now();
                     judge.observe(view);
                     audited += clock.elapsed();
                 })
             } else {
-                world.step(dt / f64::from(pieces))
+                world.step(piece)
             };
             cpu += clock.elapsed().saturating_sub(audited);
             report.add(&step);
@@ -252,8 +269,51 @@ impl Runner {
                 self.stage.incidents += 1;
                 self.incident(Some(&incident.kind), incident.kind.to_string());
             }
+            // At the end of the frame the condition has its turn after probes and checks.
+            if k < pieces && self.condition_ends_phase(at, piece, &report) {
+                if self.finished {
+                    break;
+                }
+                done += rest * part;
+                (pieces, k) = (self.pieces(dt - done), 0);
+            }
         }
         (report, cpu.as_secs_f64(), stuck)
+    }
+
+    /// The condition that the phase waits for, and the time before which it does not count \[s\].
+    fn condition(&self) -> Option<(&Expr, f64)> {
+        match &self.scene.phases.get(self.phase).filter(|_| !self.finished)?.end {
+            End::When { condition: Some(condition), at_least, .. } => Some((condition, *at_least)),
+            End::When { .. } | End::After(_) => None,
+        }
+    }
+
+    /// Judges the condition of the phase within a frame, after a piece of it \[s\]; whether the phase ended. `report` is of the frame so far.
+    fn condition_ends_phase(&mut self, time: f64, piece: f64, report: &FrameReport) -> bool {
+        let Some((_, at_least)) = self.condition() else { return false };
+        if time - self.stage.phase_begin + 0.5 * piece <= at_least {
+            return false;
+        }
+        self.stage.time = time;
+        self.stage.moment_passed();
+        self.stage.see(report);
+        for i in 0..self.asked.len() {
+            self.read_probe(self.asked[i]);
+        }
+        if !self.condition().is_some_and(|(condition, _)| condition.holds(&self.stage)) {
+            return false;
+        }
+        // What looks at the end of the phase may read all of them.
+        (0..self.probes.len()).for_each(|i| self.read_probe(i));
+        self.end_phase("condition", true);
+        self.next_phase(true);
+        true
+    }
+
+    /// The value of a probe for expressions that name it, not for its series.
+    fn read_probe(&mut self, i: usize) {
+        self.stage.probes[i] = self.probes[i].value(&self.stage);
     }
 
     fn incident(&mut self, kind: Option<&IncidentKind>, message: String) {
@@ -281,8 +341,7 @@ impl Runner {
         work.max_residual = work.max_residual.max(report.residual);
         work.max_length_error = work.max_length_error.max(report.length_error);
         work.max_contacts = work.max_contacts.max(report.contacts);
-        self.stage.last = report.clone();
-        self.stage.least = (lesser(self.stage.least.0, report.thread_clearance), lesser(self.stage.least.1, report.shape_clearance));
+        self.stage.see(report);
         let mut energy = sutura::Energy::default();
         let (mut tension, mut elongation) = (f64::NEG_INFINITY, 0.0_f64);
         for (i, rod) in self.stage.rods().enumerate() {
@@ -364,6 +423,7 @@ impl Runner {
 
     /// Begins the phase at hand and every following one that ends at once.
     fn begin_phase(&mut self) -> Result<(), SceneError> {
+        self.asked = self.condition().map_or_else(Vec::new, |(condition, _)| self.probes_of(condition));
         let Some(phase) = self.scene.phases.get(self.phase) else {
             self.finished = true;
             return Ok(());
@@ -377,10 +437,25 @@ impl Runner {
         Ok(())
     }
 
+    /// The probes that an expression reads, and those that they read.
+    fn probes_of(&self, expression: &Expr) -> Vec<usize> {
+        let mut found = Vec::new();
+        expression.probes(&mut found);
+        let mut k = 0;
+        while k < found.len() {
+            self.scene.probes[found[k]].what.probes(&mut found);
+            k += 1;
+        }
+        found.sort_unstable();
+        found
+    }
+
     fn end_phase_when_due(&mut self) {
         let Some(phase) = self.scene.phases.get(self.phase) else { return };
-        // Times are whole frames; rounding must not cost or add one.
-        let (time, slack) = (self.stage.time - self.stage.phase_begin, 0.5 / self.scene.frame_rate);
+        // Times are whole frames; rounding must not cost or add one. After a phase that ended within a frame it goes up, so that motions come to
+        // their ends.
+        let (time, frame) = (self.stage.time - self.stage.phase_begin, 1.0 / self.scene.frame_rate);
+        let slack = if self.phase_within { 1e-6 * frame } else { 0.5 * frame };
         let ended = match &phase.end {
             End::After(d) => (time + slack > *d).then_some("duration"),
             End::When { condition, at_least, at_most, late } => {
@@ -388,6 +463,8 @@ impl Runner {
                     Some(c) => c.holds(&self.stage),
                     None => self.stage.is_done(),
                 };
+                // As it is judged after the other substeps.
+                let slack = if condition.is_some() { 0.5 * self.stage.world.settings().substep.min(frame) } else { slack };
                 if holds && time + slack > *at_least {
                     Some(if condition.is_some() { "condition" } else { "motions done" })
                 } else if time + slack > *at_most {
@@ -400,11 +477,16 @@ impl Runner {
             }
         };
         let Some(reason) = ended else { return };
-        self.end_phase(reason);
-        if self.finished {
-            return;
+        self.end_phase(reason, false);
+        if !self.finished {
+            self.next_phase(false);
         }
+    }
+
+    /// `within`: a frame, not at its end.
+    fn next_phase(&mut self, within: bool) {
         self.phase += 1;
+        self.phase_within = within;
         if let Err(e) = self.begin_phase() {
             for problem in e.problems {
                 self.incident(None, problem.to_string());
@@ -413,11 +495,11 @@ impl Runner {
         }
     }
 
-    fn end_phase(&mut self, reason: &str) {
+    fn end_phase(&mut self, reason: &str, within: bool) {
         let Some(phase) = self.scene.phases.get(self.phase) else { return };
         let (index, time) = (self.phase, self.stage.time);
         for check in &mut self.checks {
-            check.phase_ended(&self.stage, time, index);
+            check.phase_ended(&self.stage, time, index, within);
         }
         let knots = phase.knots.iter().map(|t| (self.scene.threads[*t].name.clone(), self.stage.knot(*t))).collect();
         if let Some(name) = &phase.save {
@@ -569,10 +651,10 @@ impl Runner {
 
     // ---- the end ----
 
-    /// Ends the run (early or not) and hands over what it found.
+    /// Ends the run (early or not) and hands over what it found. A run that is ended early has not passed.
     pub fn finish(mut self) -> Outcome {
         if !self.finished {
-            self.end_phase("stopped");
+            self.end_phase("stopped", false);
         }
         let time = self.stage.time;
         for check in &mut self.checks {
@@ -616,7 +698,8 @@ impl Runner {
             passes_through: self.stage.judge.passes_through(),
             passages,
             probes,
-            passed: checks.iter().all(|c| c.passed) && !self.late,
+            finished: self.finished,
+            passed: self.finished && checks.iter().all(|c| c.passed) && !self.late,
             checks,
             warnings: self.warnings,
             incidents: self.incidents.into_iter().map(|(_, r)| r).collect(),

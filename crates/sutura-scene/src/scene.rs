@@ -376,6 +376,14 @@ impl Scene {
     pub fn gravity(&self) -> DVec3 {
         self.settings.gravity
     }
+    /// File of the saved state from which it starts.
+    pub fn start(&self) -> Option<&Path> {
+        self.start.as_ref().map(|s| s.0.as_path())
+    }
+    /// Names of the files of saved states, in the folder of a run.
+    pub fn saves(&self) -> impl Iterator<Item = &str> {
+        self.phases.iter().filter_map(|p| p.save.as_deref())
+    }
     /// How stills are looked at, when the scene says so.
     pub fn camera(&self) -> Option<&Camera> {
         self.camera.as_ref()

@@ -595,7 +595,7 @@ impl Stage {
                 let held: Vec<f64> = self.grips.iter().flatten().filter(|h| h.thread == thread).map(|h| arc_of(&rod, h.place)).collect();
                 judge::recognize(&rod, &held, self.seed)
             }
-            None => KnotReport { name: "unknown".into(), determinant: 0, signature: 0, tried: 0, agreed: 0, form: None },
+            None => KnotReport { knot: "unknown".into(), certain: false, determinant: 0, signature: 0, tried: 0, agreed: 0, form: None },
         };
         if let Ok(mut knots) = self.knots.lock() {
             knots.push((thread, knot.clone()));
@@ -607,6 +607,11 @@ impl Stage {
         if let Ok(knots) = self.knots.get_mut() {
             knots.clear();
         }
+    }
+    /// What the steps of a frame, or of a part of it, said.
+    pub fn see(&mut self, report: &FrameReport) {
+        self.last = report.clone();
+        self.least = (lesser(self.least.0, report.thread_clearance), lesser(self.least.1, report.shape_clearance));
     }
     /// Least clearances so far, by the audit where it runs.
     pub fn clearances(&self) -> (Option<f64>, Option<f64>) {
@@ -880,7 +885,7 @@ impl Live for Stage {
                 _ => self.is_done(),
             }),
             Read::Held => Value::Truth(matches!(first, Some(Ref::Grip(g)) if self.grips[g].is_some())),
-            Read::Knot => Value::Text(thread.map_or("unknown".into(), |t| self.knot(t).name)),
+            Read::Knot => Value::Text(thread.map_or("unknown".into(), |t| self.knot(t).knot)),
             Read::Determinant => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).determinant as f64)),
             Read::Signature => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).signature as f64)),
             Read::Form => Value::Text(thread.and_then(|t| self.knot(t).form).map_or("none".into(), |f| f.verdict)),

@@ -255,7 +255,7 @@ impl Trajectory {
     }
     /// Writes the recording to a file.
     pub fn write_to(&self, path: &Path) -> Result<(), TrajectoryError> {
-        std::fs::write(path, self.to_bytes()).map_err(TrajectoryError::Io)
+        crate::whole::write_whole(path, &self.to_bytes()).map_err(TrajectoryError::Io)
     }
     /// Reads a recording from a file.
     pub fn read_from(path: &Path) -> Result<Self, TrajectoryError> {

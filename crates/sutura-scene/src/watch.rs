@@ -24,9 +24,13 @@ impl Probe {
         }
         Probe { def: def.clone(), series: Series { name: def.name.clone(), columns, rows: Vec::new() }, next: 0.0 }
     }
+    /// Its value in SI now, which goes into no series.
+    pub fn value(&self, live: &dyn Live) -> Value {
+        self.def.what.value(live)
+    }
     /// Reads it when it is due; the value in SI is for expressions that name the probe.
     pub fn read(&mut self, live: &dyn Live, time: f64) -> Value {
-        let value = self.def.what.value(live);
+        let value = self.value(live);
         // Times are sums of frames; half a microsecond early is due.
         if time + 5e-7 >= self.next {
             let scale = self.def.unit.as_ref().map_or(1.0, |(_, u)| u.size);
@@ -153,9 +157,9 @@ impl Check {
             self.see(live, time);
         }
     }
-    /// The end of a phase.
-    pub fn phase_ended(&mut self, live: &dyn Live, time: f64, phase: usize) {
-        if self.def.span == Span::Once(Moment::PhaseEnd(phase)) {
+    /// The end of a phase; `within` a frame, where nobody has looked yet at what is the last of the phase.
+    pub fn phase_ended(&mut self, live: &dyn Live, time: f64, phase: usize, within: bool) {
+        if self.def.span == Span::Once(Moment::PhaseEnd(phase)) || within && self.def.span == Span::During(phase) {
             self.see(live, time);
         }
     }

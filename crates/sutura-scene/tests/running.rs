@@ -74,6 +74,104 @@ tolerance = "1 nm"
     assert!((out.report.simulated_s - 0.15).abs() < 1e-12);
 }
 
+/// A thread that nothing holds falls g h^2 n (n + 1) / 2 in n substeps h of implicit Euler: 9.8 mm in four of a hundredth of a second, 14.7 mm in five;
+/// 54 mm in the ten of a frame.
+const FALLING: &str = r#"
+frame_rate = 10
+[solver]
+substep = "10 ms"
+gravity = [0, 0, -9.81]
+[[thread]]
+name = "rod"
+diameter = "0.3 mm"
+young_modulus = "2 GPa"
+density = "1150 kg/m^3"
+elements = 10
+line = { from = [0, 0, 0], to = "[50, 0, 0] mm" }
+[[probe]]
+name = "height"
+what = "position(rod.start).z"
+[[probe]]
+name = "fallen"
+what = "-height"
+unit = "mm"
+[[phase]]
+name = "fall"
+until = "fallen >= 10 mm"
+[[check]]
+that = "fallen"
+after = "fall"
+equals = "14.7 mm"
+tolerance = "0.1 mm"
+[[check]]
+name = "the end of the phase is of the phase"
+that = "fallen"
+during = "fall"
+take = "last"
+equals = "14.7 mm"
+tolerance = "0.1 mm"
+"#;
+
+#[test]
+fn a_condition_ends_a_phase_at_the_substep_where_it_comes_true() {
+    let text = format!(
+        r#"{FALLING}
+[[phase]]
+name = "lift"
+action = [{{ take = "hand", at = "start", hold = "pin" }}, {{ move = "hand", keys = [{{ by = "[0, 0, 5] mm", duration = "0.1 s" }}] }}]
+duration = "0.1 s"
+[[phase]]
+name = "again"
+until = "phase_time() >= 20 ms"
+min_duration = "35 ms"
+[[check]]
+name = "what follows begins there"
+that = "position(hand).z"
+after = "lift"
+equals = "-9.7 mm"
+tolerance = "0.1 mm"
+"#
+    );
+    let mut runner = Runner::recording(Scene::parse(&text, "test.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"));
+    while !runner.step_frame().finished {}
+    let out = runner.finish();
+    assert!(out.report.passed, "{:#?}", out.report.checks);
+    let ms = |s: f64| (s * 1e4).round() / 10.0;
+    let phases: Vec<_> = out.report.phases.iter().map(|p| (ms(p.start_s), ms(p.end_s), p.ended_by.as_str())).collect();
+    // A duration that begins within a frame goes on to the end of one, so that motions come to their ends.
+    assert_eq!(phases, [(0.0, 50.0, "condition"), (50.0, 200.0, "duration"), (200.0, 240.0, "condition")]);
+    // Frames stay regular; a run that ends within one has a shorter last one.
+    let times: Vec<f64> = out.trajectory.frames.iter().map(|f| ms(f.time)).collect();
+    assert_eq!((times, out.report.frames), (vec![0.0, 100.0, 200.0, 240.0], 3));
+    assert_eq!(out.series[0].column("time").unwrap().iter().map(|t| ms(*t)).collect::<Vec<_>>(), [100.0, 200.0, 240.0]);
+    assert!((out.report.simulated_s - 0.24).abs() < 1e-12 && out.report.work.substeps == 24);
+    // It is recorded as it was done.
+    let mut same = 0;
+    let replayed = out.input.unwrap().replay(&mut |r| {
+        same += u32::from(r.is_same());
+        std::ops::ControlFlow::Continue(())
+    });
+    assert_eq!((format!("{:016x}", replayed.unwrap().state_hash()), same), (out.report.state_hash, 24));
+}
+
+#[test]
+fn a_phase_without_a_condition_steps_whole_frames() {
+    let text = FALLING.replace("until = \"fallen >= 10 mm\"", "duration = \"0.1 s\"");
+    let mut runner = Runner::recording(Scene::parse(&text, "test.toml").unwrap()).unwrap();
+    while !runner.step_frame().finished {}
+    let steps = runner.finish().input.unwrap().inputs.into_iter().filter(|i| matches!(i, sutura::input::Input::Step(..)));
+    assert_eq!(steps.count(), 1);
+}
+
+#[test]
+fn a_run_that_is_stopped_has_not_passed() {
+    let text = format!("{HANGING}\n[[phase]]\nduration = \"1 s\"\n");
+    let mut runner = Runner::new(Scene::parse(&text, "test.toml").unwrap()).unwrap();
+    runner.step_frame();
+    let report = runner.finish().report;
+    assert_eq!((report.finished, report.passed, report.phases[0].ended_by.as_str()), (false, false, "stopped"));
+}
+
 #[test]
 fn running_out_of_time_fails_the_run_unless_accepted() {
     for (late, passed, phases) in [("fail", false, 2), ("stop", false, 1), ("accept", true, 2)] {

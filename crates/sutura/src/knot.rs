@@ -470,6 +470,16 @@ impl fmt::Display for Prime {
 }
 
 impl Recognition {
+    /// Whether enough views and closures agree. The invariants are then those of the knot, whether or not it has a name here.
+    pub fn is_certain(&self) -> bool {
+        self.problem.is_none()
+    }
+    /// The name of the knot ([`KnotType::name`]). Without one it is `unnamed` where its invariants are certain and leave no knot that has a name
+    /// here, and `unknown` where they are not.
+    pub fn name(&self) -> &'static str {
+        if self.knot == KnotType::Unknown && self.is_certain() { "unnamed" } else { self.knot.name() }
+    }
+
     fn failed(problem: Problem) -> Self {
         Recognition {
             knot: KnotType::Unknown,
@@ -508,7 +518,11 @@ impl Recognition {
 impl fmt::Display for Recognition {
     /// Such as `square knot (3_1 # m3_1), det 9, signature 0`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.knot)?;
+        if self.knot == KnotType::Unknown && self.is_certain() {
+            write!(f, "knot without a name here")?;
+        } else {
+            write!(f, "{}", self.knot)?;
+        }
         if self.knot != KnotType::Unknown {
             write!(f, " ({})", self.notation)?;
         }

@@ -249,7 +249,7 @@ fn knots_that_only_resemble_are_unknown_with_their_invariants() {
         let points = closed_braid(strands, word);
         for seed in 0..10 {
             let r = recognize(&points, Ends::Closed, seed);
-            assert_eq!((r.knot, r.problem), (KnotType::Unknown, None), "{name}: {r}");
+            assert_eq!((r.knot, r.problem, r.name(), r.is_certain()), (KnotType::Unknown, None, "unnamed", true), "{name}: {r}");
             assert_eq!((r.determinant, r.signature.unsigned_abs(), r.alexander.as_slice()), (determinant, signature, alexander), "{name}: {r}");
             let mirrored = recognize(&mirrored(&points), Ends::Closed, seed);
             assert_eq!((mirrored.knot, mirrored.signature), (KnotType::Unknown, -r.signature), "{name}");
@@ -319,6 +319,9 @@ fn an_end_inside_the_loop_is_unknown() {
     assert!(knots(95).iter().all(|k| *k == KnotType::Trefoil(Hand::Right)));
     let between = knots(84);
     assert!(between.iter().filter(|k| **k == KnotType::Unknown).count() >= 7, "{between:?}");
+    // What is not certain is another thing than a knot without a name.
+    let unsure = (0..10).map(|seed| recognize(&trefoil[..336], Ends::Free, seed)).filter(|r| r.knot == KnotType::Unknown);
+    assert!(unsure.into_iter().all(|r| r.name() == "unknown" && !r.is_certain()));
     assert!(between.iter().all(|k| matches!(k, KnotType::Unknown | KnotType::Unknot | KnotType::Trefoil(Hand::Right))), "{between:?}");
 }
 

@@ -59,8 +59,8 @@ impl Program {
         let file = format!("scenes/{name}.toml");
         let mut command = self.command();
         command.args(["run", &file, "--quiet", "--no-plots", "--no-stills", "--record", "--out"]).arg(&out);
-        // A report of an earlier run must not pass for that of this one.
-        let _ = std::fs::remove_file(out.join("report.json"));
+        // Results of an earlier run must not pass for those of this one, and may be of another version of the program.
+        let _ = std::fs::remove_dir_all(&out);
         let ended = status_within(&mut command, limit);
         let report = read(&out.join("report.json"));
         match (ended, report) {

@@ -56,6 +56,15 @@ impl<'d> Loader<'d> {
 
     pub(super) fn profile(&mut self, table: &Table<'d>) -> Option<ProfileDef> {
         let name = table.need("name", "the name of the profile").and_then(|v| self.checked_name(&v));
+        // It is a series, as a probe is and what each frame was.
+        if let Some(name) = &name
+            && let Some(v) = table.get("name")
+        {
+            if name == "frame" || self.profiles.contains(name) || matches!(self.names.get(name), Some(Named::Probe(_))) {
+                v.problem(format!("the name `{name}` is taken"), None);
+            }
+            self.profiles.push(name.clone());
+        }
         let thread = self.thread_of(table);
         let words: Vec<(&str, ProfileColumn)> = PROFILES.iter().map(|p| (p.0, *p)).collect();
         let what = table.need("what", "what to read along the thread, such as [\"position\", \"tension\"]").and_then(|v| {
@@ -158,7 +167,7 @@ impl<'d> Loader<'d> {
                 let text = v.text()?.into_owned();
                 let (no_such, names) = match that.reads() {
                     Some(Read::Form) => ("no form of a knot", [&sutura::knot::Verdict::NAMES[..], &["none"]].concat()),
-                    _ => ("no knot", [&sutura::knot::KnotType::NAMES[..], &["unknown"]].concat()),
+                    _ => ("no knot", [&sutura::knot::KnotType::NAMES[..], &["unnamed", "unknown"]].concat()),
                 };
                 if !names.iter().any(|n| texts_match(n, &text)) {
                     v.problem(format!("{no_such} is called `{text}`"), suggest(&text, names));

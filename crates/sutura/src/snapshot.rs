@@ -24,6 +24,8 @@ pub(crate) trait Bytes: Sized {
 
 pub(crate) struct Reader<'a> {
     pub left: &'a [u8],
+    /// Version of what is read.
+    pub version: u32,
 }
 
 impl Reader<'_> {
@@ -223,7 +225,7 @@ pub(crate) fn write(state: &State, made_of: u64) -> Vec<u8> {
 
 /// What threads were made of, where the snapshot says so, and the state.
 pub(crate) fn read(bytes: &[u8]) -> Result<(Option<u64>, State), Error> {
-    let mut input = Reader { left: bytes };
+    let mut input = Reader { left: bytes, version: 0 };
     let made_of = match &input.array::<8>()? {
         MAGIC => Some(u64::take(&mut input)?),
         BARE => None,

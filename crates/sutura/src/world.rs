@@ -7,7 +7,7 @@ use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, 
 use crate::model::material::Material;
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
-use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
+use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
 use crate::model::{Model, ShapeModel};
 use crate::params::{Friction, Settings, Solver};
@@ -408,13 +408,9 @@ impl World {
 
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
-        spec.validate()?;
-        let shape = ShapeModel {
-            geometry: spec.geometry.clone(),
-            collider: crate::collide::Collider::new(&spec.geometry)?,
-            surface: spec.surface,
-            motion: spec.motion,
-        };
+        let Checked { geometry, closed, notes } = spec.check()?;
+        let collider = crate::collide::Collider::new(&geometry)?;
+        let shape = ShapeModel { geometry, collider, surface: spec.surface, motion: spec.motion, closed, notes };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
         let n = self.model.shapes.len();
         self.state.shape_pose.resize(n, Pose::IDENTITY);
@@ -688,6 +684,15 @@ impl World {
     pub fn shape(&self, shape: Handle<Shape>) -> Result<ShapeView<'_>, Error> {
         let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
         Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], motion: s.motion, surface: s.surface, slot: shape.index() })
+    }
+    /// What was mended of a mesh when it was inserted, and what may not have been meant: that it is open and where, that it is a container. Each is a
+    /// sentence without its full stop.
+    pub fn shape_notes(&self, shape: Handle<Shape>) -> Result<&[String], Error> {
+        Ok(&self.model.shapes.get(shape).ok_or(SHAPE)?.notes)
+    }
+    /// Whether a shape has an inside: all but open meshes.
+    pub fn shape_is_closed(&self, shape: Handle<Shape>) -> Result<bool, Error> {
+        Ok(self.model.shapes.get(shape).ok_or(SHAPE)?.closed)
     }
     /// Reads everything.
     pub fn view(&self) -> View<'_> {

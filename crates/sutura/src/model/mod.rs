@@ -2,6 +2,7 @@
 
 pub mod grip;
 pub mod material;
+pub mod mesh;
 pub mod reel;
 pub mod rod;
 pub mod section;
@@ -71,6 +72,10 @@ pub(crate) struct ShapeModel {
     pub collider: crate::collide::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,
+    /// Whether a mesh is closed, so that it has an inside; of the other shapes true.
+    pub closed: bool,
+    /// What was mended of a mesh, and what a user may not have meant.
+    pub notes: Vec<String>,
 }
 
 impl Model {

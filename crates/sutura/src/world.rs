@@ -14,6 +14,7 @@ use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::Scratch;
+use crate::snapshot::{Build, Snapshot};
 use crate::state::{GripState, LoadState, Onset, ReelState, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
@@ -789,24 +790,30 @@ impl World {
 
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
     pub fn snapshot(&self) -> Vec<u8> {
-        crate::snapshot::write(&self.state, crate::snapshot::made_of(&self.model))
+        crate::snapshot::write(&self.model, &self.state)
     }
 
-    /// Takes the world back to a snapshot of a world with the same threads and shapes. On error nothing is changed.
+    /// Takes the world back to a snapshot of a world with the same threads, shapes and welds. On error nothing is changed; it says what differs: number and
+    /// rest lengths of elements, radius, section, rest shape, whether a thread is closed, the geometry of a shape, the places of a weld. (Of a snapshot of an
+    /// earlier version lengths and numbers are compared, since it says no more.)
     ///
     /// Materials, settings and friction are the model's: they stay as they are now. Where threads were of another material, or stretched otherwise, when the
     /// snapshot was taken, its strains, velocities and plastic set are taken over, tensions follow the strains, and the integrator starts anew, as if
     /// [`World::set_material`] came after it. Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let (made_of, state) = crate::snapshot::read(bytes)?;
+        let Snapshot { materials, build, state } = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
+        if let Some(reason) = build.and_then(|there| Build::of(&self.model, &self.state).unlike(&there)) {
+            return Err(Error::Snapshot { reason });
+        }
         crate::reel::check(&self.model, &self.state, &state).map_err(refused)?;
+        crate::reel::check_lengths(&self.model, &self.state, &state).map_err(|reason| Error::Snapshot { reason })?;
         let before = self.state.clone();
         crate::reel::refit(&mut self.model, &before, &state);
         let fits = self.check_fit(&state);
         if fits.is_ok() {
             self.take_up(&state);
-            if made_of.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
+            if materials.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
                 self.state.interrupt(Onset::Unknown);
                 self.follow_strain(0..self.model.mass.len());
             }

@@ -8,6 +8,8 @@ use crate::model::rod::Rod;
 pub struct StepReport {
     /// Simulated time at the end \[s\].
     pub time: f64,
+    /// Of the time wanted, what was simulated \[s\]; the rest passed with everything at rest, as where no acceptable substep was found.
+    pub simulated: f64,
     /// Substeps accepted.
     pub substeps: u32,
     /// Substeps thrown away and done again: as two halves, or with a thread that stretches where it cannot keep its length.

@@ -1,5 +1,7 @@
 //! What a step says of itself.
 
+use crate::collide::overlap::{Overlap, OverlapWith};
+use crate::error::coordinates;
 use crate::handle::Handle;
 use crate::model::rod::Rod;
 
@@ -72,6 +74,9 @@ pub enum IncidentKind {
         /// Distance \[m\].
         distance: f64,
     },
+    /// What was inserted since the last step, or jumped in this one, lies in something. What is only pressed into each other is pushed apart; where a centerline
+    /// passes through, the world goes on as it is, and what contact makes of it is left to chance.
+    Overlap(Overlap),
     /// A time step that is not a finite number > 0, or an input that is not finite: nothing was done.
     BadInput {
         /// Which input.
@@ -99,6 +104,14 @@ impl core::fmt::Display for IncidentKind {
                 write!(f, "no motion keeps an inextensible thread at its length (off by {:.3} %); it stretched as its material does", 100.0 * elongation)
             }
             IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
+            IncidentKind::Overlap(o) => {
+                write!(f, "thread {:?} at {:.4e} m {} ", o.rod, o.arc, o.verb())?;
+                match o.with {
+                    OverlapWith::Rod { rod, arc } => write!(f, "thread {rod:?} at {arc:.4e} m")?,
+                    OverlapWith::Shape(shape) => write!(f, "shape {shape:?}")?,
+                }
+                write!(f, ", {:.3e} m ({:.2} diameters) deep, at {}", o.depth, o.diameters, coordinates(o.point))
+            }
             IncidentKind::BadInput { what } => write!(f, "bad input: {what}; nothing was done"),
             IncidentKind::NotInPaper { what } => write!(f, "the paper's solver does not know {what}; nothing moved"),
             IncidentKind::PassedThrough { .. } => write!(f, "thread passed through"),

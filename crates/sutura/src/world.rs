@@ -1,5 +1,6 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
+use crate::collide::overlap::{Overlap, OverlapWith};
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
@@ -9,7 +10,7 @@ use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
-use crate::model::{Model, ShapeModel};
+use crate::model::{Model, Placed, ShapeModel};
 use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
@@ -116,6 +117,7 @@ impl World {
             surface: spec.surface,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
+        model.placed.rods.push(handle.index);
         for e in 0..=n {
             // The last entry is no element; its stiffness is never used.
             let section = low.sections[e.min(n - 1)];
@@ -409,10 +411,11 @@ impl World {
 
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
-        let Checked { geometry, closed, notes } = spec.check()?;
+        let Checked { geometry, closed, container, notes } = spec.check()?;
         let collider = crate::collide::Collider::new(&geometry)?;
-        let shape = ShapeModel { geometry, collider, surface: spec.surface, motion: spec.motion, closed, notes };
+        let shape = ShapeModel { geometry, collider, surface: spec.surface, motion: spec.motion, closed, container, notes };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
+        self.model.placed.shapes.push(handle.index);
         let n = self.model.shapes.len();
         self.state.shape_pose.resize(n, Pose::IDENTITY);
         self.state.shape_target.resize(n, Pose::IDENTITY);
@@ -731,6 +734,13 @@ impl World {
         threads.chain(shapes)
     }
 
+    /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it. What neighbors along a thread or through
+    /// a weld is left out, and so is what overlaps by less than a tenth of a diameter, as loaded contacts and arcs cut into chords do. The first step after
+    /// [`World::insert_rod`] and [`World::insert_shape`] says it of what was inserted ([`IncidentKind::Overlap`]).
+    pub fn overlaps(&self) -> Vec<Overlap> {
+        crate::collide::overlap::overlaps(&self.model, &self.state)
+    }
+
     /// Simulated time \[s\].
     pub fn time(&self) -> f64 {
         self.state.time
@@ -754,10 +764,13 @@ impl World {
             report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is more than a million substeps" } });
             return report;
         }
-        self.report_teleports(dt, &mut report);
+        let placed = core::mem::take(&mut self.model.placed);
+        self.report_overlaps(&placed, &mut report);
+        let teleported = self.report_teleports(dt, &mut report);
         let mut interval = crate::step::Interval { start, length: dt, observe };
         crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
         report.time = self.state.time;
+        self.report_overlaps(&teleported, &mut report);
         if self.model.settings.solver == Solver::Direct {
             report.contacts = self.contacts().count() as u32;
         }
@@ -765,15 +778,43 @@ impl World {
         report
     }
 
-    /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
-    fn report_teleports(&self, dt: f64, report: &mut StepReport) {
-        const FASTEST: f64 = 100.0;
-        let grips = self.state.grips.iter().map(|(_, g)| (g.target.position - g.pose.position).length());
-        let shapes =
-            self.model.shapes.iter().map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
-        for distance in grips.chain(shapes).filter(|d| *d > FASTEST * dt) {
-            report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
+    /// What was put where something is already is told; contact does with it what it can.
+    fn report_overlaps(&self, placed: &Placed, report: &mut StepReport) {
+        if placed.rods.is_empty() && placed.shapes.is_empty() {
+            return;
         }
+        let put = |rod: Handle<Rod>| placed.rods.contains(&rod.index);
+        let one = |o: &Overlap| match o.with {
+            OverlapWith::Rod { rod, .. } => put(o.rod) || put(rod),
+            OverlapWith::Shape(shape) => put(o.rod) || placed.shapes.contains(&shape.index),
+        };
+        let time = report.time;
+        report.incidents.extend(self.overlaps().into_iter().filter(one).map(|o| Incident { time, kind: IncidentKind::Overlap(o) }));
+    }
+
+    /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
+    fn report_teleports(&self, dt: f64, report: &mut StepReport) -> Placed {
+        const FASTEST: f64 = 100.0;
+        let mut placed = Placed::default();
+        let mut tell = |distance: f64| {
+            let far = distance > FASTEST * dt;
+            if far {
+                report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
+            }
+            far
+        };
+        for (_, g) in self.state.grips.iter() {
+            if tell((g.target.position - g.pose.position).length()) {
+                placed.rods.push(g.rod);
+            }
+        }
+        for (slot, _) in self.model.shapes.iter() {
+            let k = slot as usize;
+            if tell((self.state.shape_target[k].position - self.state.shape_pose[k].position).length()) {
+                placed.shapes.push(slot);
+            }
+        }
+        placed
     }
 
     fn length_error(&self) -> f64 {

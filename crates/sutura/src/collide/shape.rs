@@ -24,7 +24,7 @@ pub(crate) struct Distance {
 }
 
 /// Our body axes to parry's and back.
-fn to_parry(p: DVec3) -> DVec3 {
+pub(super) fn to_parry(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
 }
 fn from_parry(p: DVec3) -> DVec3 {

@@ -35,6 +35,8 @@ pub(crate) struct CheckedMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Whether every component is closed: then the side of a point is that of the surface there.
     pub closed: bool,
+    /// Whether a part is a container, so that what is far away is solid.
+    pub container: bool,
     /// What was mended, and what a user may not have meant, each a sentence without its full stop.
     pub notes: Vec<String>,
 }
@@ -102,8 +104,8 @@ pub(crate) fn check(vertices: &[DVec3], triangles: &[[u32; 3]], open: bool) -> R
     }
     let component = orient(vertices, &mut faces, &sides, &mut notes)?;
     let closed = openings(vertices, &faces, &component, open, &mut notes)?;
-    containers(vertices, &faces, &component, &closed, &mut notes);
-    Ok(CheckedMesh { vertices: vertices.to_vec(), triangles: faces.iter().map(|f| f.corners).collect(), closed: closed.iter().all(|c| *c), notes })
+    let container = containers(vertices, &faces, &component, &closed, &mut notes);
+    Ok(CheckedMesh { vertices: vertices.to_vec(), triangles: faces.iter().map(|f| f.corners).collect(), closed: closed.iter().all(|c| *c), container, notes })
 }
 
 fn invalid(field: impl Into<String>, value: impl Into<String>, wanted: &'static str) -> Error {
@@ -376,8 +378,9 @@ impl Hole {
     }
 }
 
-/// Says which closed components are containers: turned inside out, and in no other.
-fn containers(vertices: &[DVec3], faces: &[Face], component: &[usize], closed: &[bool], notes: &mut Vec<String>) {
+/// Says which closed components are containers: turned inside out, and in no other. Whether there are any.
+fn containers(vertices: &[DVec3], faces: &[Face], component: &[usize], closed: &[bool], notes: &mut Vec<String>) -> bool {
+    let mut any = false;
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); closed.len()];
     component.iter().enumerate().for_each(|(i, c)| members[*c].push(i));
     let corners = |i: usize| faces[i].corners.map(|c| vertices[c as usize]);
@@ -404,16 +407,18 @@ fn containers(vertices: &[DVec3], faces: &[Face], component: &[usize], closed: &
             }
         };
         if !(0..closed.len()).any(around) {
+            any = true;
             let number = faces[members[c][0]].number;
             notes.push(format!(
                 "the part with triangle {number} is a container: its normals point inward, so threads are free inside it and everything around it is solid"
             ));
         }
     }
+    any
 }
 
 /// Signed solid angle of a triangle as seen from the origin (van Oosterom and Strackee 1983).
-fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+pub(crate) fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let (la, lb, lc) = (a.length(), b.length(), c.length());
     let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
     2.0 * libm::atan2(a.dot(b.cross(c)), below)

@@ -116,10 +116,10 @@ impl ShapeSpec {
     pub(crate) fn check(&self) -> Result<Checked, Error> {
         self.validate()?;
         let Geometry::Mesh { vertices, triangles } = &self.geometry else {
-            return Ok(Checked { geometry: self.geometry.clone(), closed: true, notes: Vec::new() });
+            return Ok(Checked { geometry: self.geometry.clone(), closed: true, container: false, notes: Vec::new() });
         };
-        let CheckedMesh { vertices, triangles, closed, notes } = mesh::check(vertices, triangles, self.open)?;
-        Ok(Checked { geometry: Geometry::Mesh { vertices, triangles }, closed, notes })
+        let CheckedMesh { vertices, triangles, closed, container, notes } = mesh::check(vertices, triangles, self.open)?;
+        Ok(Checked { geometry: Geometry::Mesh { vertices, triangles }, closed, container, notes })
     }
 }
 
@@ -128,6 +128,7 @@ pub(crate) struct Checked {
     pub geometry: Geometry,
     /// Whether it has an inside.
     pub closed: bool,
+    pub container: bool,
     /// What was mended, and what a user may not have meant.
     pub notes: Vec<String>,
 }

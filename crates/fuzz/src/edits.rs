@@ -53,7 +53,7 @@ impl Session {
             _ if which >= 240 => self.edit_joined(which, input),
             0..=1 => self.insert_rod(input),
             2 => {
-                let shape = ShapeSpec { geometry: geometry(input), pose: pose(input), surface: input.below(3) as u32, motion: motion(input) };
+                let shape = ShapeSpec { geometry: geometry(input), pose: pose(input), surface: input.below(3) as u32, motion: motion(input), open: true };
                 self.shapes.extend(self.world.insert_shape(&shape));
             }
             3..=4 => {

@@ -340,7 +340,7 @@ fn ground(d: &mut Draw, kind: Kind) -> ShapeSpec {
         Kind::Worked if d.chance(0.3) => ShapeMotion::Pushed { direction: DVec3::Z, force: d.log(1e-3, 0.1), speed_limit: d.log(0.02, 0.2) },
         _ => ShapeMotion::Fixed,
     };
-    ShapeSpec { geometry, pose, surface: d.whole(0, 1), motion }
+    ShapeSpec { geometry, pose, surface: d.whole(0, 1), motion, open: false }
 }
 
 /// The scene of a number, and its kind in words: every second one is absurd, the others take turns.
@@ -451,7 +451,7 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
                 .clone();
             let motion = [ShapeMotion::Driven, ShapeMotion::Pushed { direction: d.direction(), force: wild(d), speed_limit: wild(d) }][d.whole(0, 1) as usize];
             let shape = scene.shapes.len();
-            scene.shapes.push(ShapeSpec { geometry, pose: Pose::new(d.vector(0.02), d.turn()), surface: 1, motion });
+            scene.shapes.push(ShapeSpec { geometry, pose: Pose::new(d.vector(0.02), d.turn()), surface: 1, motion, open: false });
             scene.acts.push((when, Act::ShapePose(shape, Pose::new(d.vector(x), d.turn()))));
         }
         32 => scene.acts.push((when, if d.chance(0.5) { Act::RemoveRod(number) } else { Act::RemoveShape(0) })),

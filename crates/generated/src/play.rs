@@ -185,7 +185,7 @@ impl<'a> Player<'a> {
         self.act();
         self.frame += 1;
         let report = self.world.step_with(self.scene.frame, observe);
-        let stuck = report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite));
+        let stuck = report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::Held { .. } | IncidentKind::NotFinite));
         self.stuck = if stuck { self.stuck + 1 } else { 0 };
         report
     }
@@ -247,6 +247,7 @@ pub fn kind(incident: &IncidentKind) -> &'static str {
     match incident {
         IncidentKind::NotFinite => "not finite, rolled back",
         IncidentKind::Stuck { .. } => "stuck",
+        IncidentKind::Held { .. } => "held",
         IncidentKind::NotConverged { .. } => "not converged",
         IncidentKind::LengthNotKept { .. } => "length not kept",
         IncidentKind::Teleport { .. } => "teleport",

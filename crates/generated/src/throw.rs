@@ -523,7 +523,7 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
             return None;
         }
     }
-    scene.shapes.push(ShapeSpec { geometry: t.geometry, pose, surface: 0, motion });
+    scene.shapes.push(ShapeSpec { motion, ..ShapeSpec::fixed(t.geometry, pose) });
     Some(Throw { family, how, scene, passive_from })
 }
 

@@ -168,7 +168,7 @@ impl Way {
             }
             other => other,
         };
-        ShapeSpec { geometry, pose: self.pose(shape.pose), surface: shape.surface, motion }
+        ShapeSpec { geometry, pose: self.pose(shape.pose), surface: shape.surface, motion, open: shape.open }
     }
 
     fn load(&self, kind: &LoadKind, n: u32) -> LoadKind {

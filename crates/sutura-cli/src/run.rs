@@ -62,6 +62,12 @@ pub fn simulate(mut runner: Runner, quiet: bool) -> Outcome {
     if let Ok(style) = ProgressStyle::with_template("{bar:30.blue/white} {percent:>3} %  {msg}") {
         bar.set_style(style.progress_chars("━━─"));
     }
+    for note in runner.notes() {
+        bar.println(format!("note: {note}"));
+    }
+    for overlap in runner.overlaps() {
+        bar.println(format!("{}: {}", if overlap.through { "error" } else { "warning" }, overlap.message));
+    }
     let (mut solver_ms, mut drawn, mut warned) = (0.0, Instant::now(), 0);
     loop {
         let p = runner.step_frame();
@@ -250,7 +256,8 @@ fn summary(r: &Report) -> String {
     let mut run = table(&["run", ""], &[]);
     let gap = |g: Option<f64>| g.map_or_else(|| "nothing came near".into(), |g| format!("{g:.4}"));
     let truth = |b: Option<bool>| b.map_or("not audited", |b| if b { "YES" } else { "no" });
-    run.add_row(["simulated".to_string(), format!("{:.3} s in {} frames", r.simulated_s, r.frames)]);
+    let missed = if r.not_simulated_s > 0.0 { format!("; {:.3} s passed without", r.not_simulated_s) } else { String::new() };
+    run.add_row(["simulated".to_string(), format!("{:.3} s in {} frames{missed}", r.simulated_s, r.frames)]);
     run.add_row(["solver".to_string(), format!("{:.3} s CPU", r.cpu_s)]);
     run.add_row(["real-time factor".to_string(), format!("{:.2}, worst second {:.2}", r.real_time_factor, r.worst_second_real_time_factor)]);
     let t = &r.ms_per_frame;
@@ -303,6 +310,9 @@ fn summary(r: &Report) -> String {
     if !r.checks.is_empty() {
         out.push_str(&format!("{checks}\n\n"));
     }
+    for note in &r.notes {
+        out.push_str(&format!("note: {note}\n"));
+    }
     for w in &r.warnings {
         out.push_str(&format!("warning at {:.4} s: {}\n", w.time_s, w.message));
     }
@@ -317,11 +327,12 @@ fn summary(r: &Report) -> String {
     let verdict = match (r.passed, failed) {
         (true, _) if r.checks.is_empty() => "No checks in this scene.".to_string(),
         (true, _) => format!("All {} checks passed.", r.checks.len()),
+        (false, 0) if !r.failures.is_empty() => format!("FAILED: {}.", r.failures.join("; ")),
         (false, 0) => {
             let last = r.phases.last().map_or_else(String::new, |p| format!(" in phase `{}`: {}", p.name, p.ended_by));
             format!("FAILED{last}.")
         }
-        (false, n) => format!("FAILED: {n} of {} checks.", r.checks.len()),
+        (false, n) => format!("FAILED: {}.", [vec![format!("{n} of {} checks", r.checks.len())], r.failures.clone()].concat().join("; ")),
     };
     out.push_str(&verdict);
     out.push('\n');

@@ -29,6 +29,13 @@ pub struct Location {
     pub key: String,
 }
 
+impl std::fmt::Display for Location {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
+        write!(f, "{}{line}: {}", self.file, self.key)
+    }
+}
+
 impl Location {
     /// A problem at this place.
     pub fn problem(&self, message: impl Into<String>) -> Problem {

@@ -29,8 +29,8 @@ mod whole;
 
 pub use error::{Problem, SceneError};
 pub use report::{
-    CheckReport, CheckValue, Clearance, FormReport, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, ProbeReport, Report, SavedState, Series,
-    SolverReport, ThreadReport, WarningReport, WorkReport,
+    CheckReport, CheckValue, Clearance, FormReport, FrameTimes, IncidentReport, KnotReport, Outcome, OverlapReport, PhaseReport, ProbeReport, Report,
+    SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
 };
 pub use runner::{Progress, Runner};
 pub use samples::{Sample, samples};

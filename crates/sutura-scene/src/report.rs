@@ -69,8 +69,11 @@ pub struct Report {
     pub version: String,
     /// Solver and its settings.
     pub solver: SolverReport,
-    /// Simulated time \[s\].
+    /// Time that was simulated \[s\].
     pub simulated_s: f64,
+    /// Time that passed with everything at rest because no acceptable substep was found \[s\].
+    #[serde(default)]
+    pub not_simulated_s: f64,
     /// CPU time of the solver \[s\]; audit, recording, probes and checks are not in it.
     pub cpu_s: f64,
     /// `simulated_s / cpu_s`.
@@ -96,8 +99,17 @@ pub struct Report {
     /// What a real thread might not have borne; no failure.
     #[serde(default)]
     pub warnings: Vec<WarningReport>,
+    /// What lay in each other at the start, or was put where something was already.
+    #[serde(default)]
+    pub overlaps: Vec<OverlapReport>,
+    /// What was mended of meshes, and what of them may not have been meant: in words.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// What went wrong.
     pub incidents: Vec<IncidentReport>,
+    /// Why the run did not pass, beside checks that failed and phases that ran out of time: in words.
+    #[serde(default)]
+    pub failures: Vec<String>,
     /// Hash of the last state, 16 hexadecimal digits.
     pub state_hash: String,
     /// What the solver did.
@@ -106,7 +118,7 @@ pub struct Report {
     pub phases: Vec<PhaseReport>,
     /// Whether the run came to its end; not when it was stopped before.
     pub finished: bool,
-    /// Whether it came to its end, every check passed and no phase ran out of time (where running out is a failure).
+    /// Whether it came to its end, every check passed, no phase ran out of time (where running out is a failure), and `failures` is empty.
     pub passed: bool,
 }
 
@@ -212,6 +224,31 @@ pub struct WarningReport {
     /// The strength that it passed \[N\].
     #[serde(rename = "strength_N")]
     pub strength_n: f64,
+}
+
+/// A place where a thread lay in a thread or a shape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OverlapReport {
+    /// In words, with file, line and key of both.
+    pub message: String,
+    /// When \[s\].
+    pub time_s: f64,
+    /// Name of the thread.
+    pub thread: String,
+    /// Where on it, rest length from its start \[m\].
+    pub arc_m: f64,
+    /// Name of the thread or shape that it lay in.
+    pub with: String,
+    /// Where on that, if it is a thread \[m\].
+    pub with_arc_m: Option<f64>,
+    /// Place in the world \[m\].
+    pub point_m: [f64; 3],
+    /// How deep \[m\].
+    pub depth_m: f64,
+    /// The same over the diameter, of two threads the mean one.
+    pub depth_diameters: f64,
+    /// Whether a centerline ran within the other thread, in the solid or across the mesh; else they were only pressed into each other.
+    pub through: bool,
 }
 
 /// Least clearance by kind of pair: (distance - radii) / thread diameter, negative overlaps. `None`: nothing was ever near.

@@ -6,7 +6,8 @@
 use crate::error::SceneError;
 use crate::expr::Expr;
 use crate::report::{
-    Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport, WarningReport, WorkReport,
+    Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, OverlapReport, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport,
+    WarningReport, WorkReport,
 };
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Mover, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
@@ -17,7 +18,7 @@ use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{ContactWith, Grip, Handle, Incident, IncidentKind, Pose, Rod, RodView, World};
+use sutura::{ContactWith, Grip, Handle, Incident, IncidentKind, Overlap, OverlapWith, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -45,6 +46,10 @@ pub struct Runner {
     phases: Vec<PhaseReport>,
     incidents: Vec<(IncidentKey, IncidentReport)>,
     warnings: Vec<WarningReport>,
+    overlaps: Vec<OverlapReport>,
+    notes: Vec<String>,
+    /// Time that was not simulated \[s\].
+    missed: f64,
     work: WorkReport,
     max_elongation: Vec<f64>,
     max_tension: Vec<f64>,
@@ -72,6 +77,9 @@ pub struct Progress {
     /// Whether the run is over; further calls do nothing.
     pub finished: bool,
 }
+
+/// Part of a run that may have passed without being simulated.
+const MOST_MISSED: f64 = 0.1;
 
 /// Frames without a good substep after which a run is given up.
 const GIVE_UP: u32 = 30;
@@ -126,6 +134,9 @@ impl Runner {
             phases: Vec::new(),
             incidents: Vec::new(),
             warnings: Vec::new(),
+            overlaps: Vec::new(),
+            notes: Vec::new(),
+            missed: 0.0,
             work: WorkReport { converged: true, ..WorkReport::default() },
             max_elongation: vec![0.0; n],
             max_tension: vec![f64::NEG_INFINITY; n],
@@ -135,6 +146,13 @@ impl Runner {
             stage,
         };
         runner.trajectory.header = runner.header();
+        for (def, handle) in runner.scene.shapes.iter().zip(&runner.stage.shapes) {
+            let notes = runner.stage.world.shape_notes(*handle).unwrap_or_default();
+            runner.notes.extend(notes.iter().map(|note| format!("mesh `{}`: {note} ({})", def.name, def.location)));
+        }
+        for overlap in runner.stage.world.overlaps() {
+            runner.overlap(&overlap);
+        }
         // The audit sweeps from the first state on.
         let Runner { stage, .. } = &mut runner;
         stage.judge.observe(stage.world.view());
@@ -265,6 +283,11 @@ impl Runner {
             cpu += clock.elapsed().saturating_sub(audited);
             report.add(&step);
             for incident in &step.incidents {
+                if let IncidentKind::Overlap(overlap) = &incident.kind {
+                    let message = self.overlap(overlap);
+                    self.incident(None, message);
+                    continue;
+                }
                 stuck |= matches!(incident.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite);
                 self.stage.incidents += 1;
                 self.incident(Some(&incident.kind), incident.kind.to_string());
@@ -316,6 +339,54 @@ impl Runner {
         self.stage.probes[i] = self.probes[i].value(&self.stage);
     }
 
+    /// Takes note of what lies in each other; in words.
+    fn overlap(&mut self, o: &Overlap) -> String {
+        let thread = |rod: Handle<Rod>| {
+            let k = self.stage.threads.iter().position(|h| *h == rod);
+            k.map_or_else(|| (format!("thread {rod:?}"), None), |k| (self.scene.threads[k].name.clone(), Some(&self.scene.threads[k].location)))
+        };
+        let shape = |shape: Handle<sutura::Shape>| {
+            let k = self.stage.shapes.iter().position(|h| *h == shape);
+            k.map_or_else(|| (format!("shape {shape:?}"), None), |k| (self.scene.shapes[k].name.clone(), Some(&self.scene.shapes[k].location)))
+        };
+        let mm = |v: f64| format!("{:.3}", 1e3 * v + 0.0);
+        let (name, mut places) = (thread(o.rod).0, thread(o.rod).1.map(ToString::to_string).into_iter().collect::<Vec<_>>());
+        let (with, with_arc) = match o.with {
+            OverlapWith::Rod { rod, arc } => (thread(rod), Some(arc)),
+            OverlapWith::Shape(handle) => (shape(handle), None),
+        };
+        let itself = matches!(o.with, OverlapWith::Rod { rod, .. } if rod == o.rod);
+        places.extend(with.1.map(ToString::to_string).filter(|_| !itself));
+        let other = if itself { "itself".into() } else { format!("`{}`", with.0) };
+        let at = with_arc.map_or_else(String::new, |arc| format!(" at {} mm", mm(arc)));
+        let [x, y, z] = o.point.to_array().map(mm);
+        let message = format!(
+            "`{name}` at {} mm {} {other}{at}, {} mm ({:.2} diameters) deep, at ({x}, {y}, {z}) mm ({})",
+            mm(o.arc),
+            o.verb(),
+            mm(o.depth),
+            o.diameters,
+            places.join("; ")
+        );
+        let report = OverlapReport {
+            message: message.clone(),
+            time_s: self.stage.time,
+            thread: name,
+            arc_m: o.arc,
+            with: with.0,
+            with_arc_m: with_arc,
+            point_m: o.point.to_array(),
+            depth_m: o.depth,
+            depth_diameters: o.diameters,
+            through: o.through,
+        };
+        // The first step says once more what was so at the start.
+        if self.overlaps.iter().all(|known| known.message != report.message) {
+            self.overlaps.push(report);
+        }
+        message
+    }
+
     fn incident(&mut self, kind: Option<&IncidentKind>, message: String) {
         let (key, time) = (kind.map(discriminant), self.stage.time);
         if kind.is_none() {
@@ -333,6 +404,10 @@ impl Runner {
     /// Sums up a frame.
     fn take_note(&mut self, report: &FrameReport, cpu: f64) {
         self.cpu.push(cpu);
+        let frame = 1.0 / self.scene.frame_rate;
+        let missed = frame - report.simulated;
+        // Pieces of a frame add up to it but for rounding.
+        self.missed += if missed > 1e-9 * frame { missed } else { 0.0 };
         let work = &mut self.work;
         work.substeps += u64::from(report.substeps);
         work.rejected += u64::from(report.rejected);
@@ -527,6 +602,31 @@ impl Runner {
         }
     }
 
+    /// Why the run does not pass, whatever its checks say.
+    fn failures(&self) -> Vec<String> {
+        let mut failures = Vec::new();
+        let through = self.overlaps.iter().filter(|o| o.through).count();
+        if through > 0 {
+            failures.push(format!("threads were put through each other or into shapes at {through} place{}", if through == 1 { "" } else { "s" }));
+        } else if !self.overlaps.is_empty() && !self.stage.world.overlaps().is_empty() {
+            failures.push("what was put into each other lies in each other still".into());
+        }
+        let total = self.stage.time;
+        if self.missed > MOST_MISSED * total {
+            let simulated = (total - self.missed).max(0.0);
+            failures.push(format!("of {total:.4} s only {simulated:.4} s were simulated: no acceptable substep was found for the rest"));
+        }
+        failures
+    }
+
+    /// What lies in each other, so far: at the start, and put there since.
+    pub fn overlaps(&self) -> &[OverlapReport] {
+        &self.overlaps
+    }
+    /// What was mended of meshes, and what of them may not have been meant.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
     /// The warnings so far.
     pub fn warnings(&self) -> &[WarningReport] {
         &self.warnings
@@ -665,7 +765,8 @@ impl Runner {
         let solver = self.solver_report();
         let (thread_thread, thread_shape) = self.stage.clearances();
         let cpu_s: f64 = self.cpu.iter().sum();
-        let simulated_s = self.stage.world.time() - self.world_start;
+        let simulated_s = (self.stage.world.time() - self.world_start - self.missed).max(0.0);
+        let failures = self.failures();
         let passages = {
             let thread = |slot: usize| {
                 self.stage.threads.iter().position(|h| h.index() == slot).map_or(format!("thread {slot}"), |i| self.scene.threads[i].name.clone())
@@ -688,6 +789,7 @@ impl Runner {
             version: env!("CARGO_PKG_VERSION").into(),
             solver,
             simulated_s,
+            not_simulated_s: self.missed,
             cpu_s,
             real_time_factor: ratio(simulated_s, cpu_s),
             worst_second_real_time_factor: worst_second(&self.cpu, self.scene.frame_rate),
@@ -699,9 +801,12 @@ impl Runner {
             passages,
             probes,
             finished: self.finished,
-            passed: self.finished && checks.iter().all(|c| c.passed) && !self.late,
+            passed: self.finished && checks.iter().all(|c| c.passed) && !self.late && failures.is_empty(),
+            failures,
             checks,
             warnings: self.warnings,
+            overlaps: self.overlaps,
+            notes: self.notes,
             incidents: self.incidents.into_iter().map(|(_, r)| r).collect(),
             state_hash: format!("{:016x}", self.stage.world.state_hash()),
             work: self.work,

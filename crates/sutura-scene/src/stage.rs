@@ -95,6 +95,8 @@ enum Growing {
 /// What the last frame's steps said together.
 #[derive(Debug, Clone, Default)]
 pub struct FrameReport {
+    /// Time that was simulated \[s\].
+    pub simulated: f64,
     pub substeps: u32,
     pub rejected: u32,
     pub newton_iterations: u32,
@@ -108,6 +110,7 @@ pub struct FrameReport {
 
 impl FrameReport {
     pub fn add(&mut self, step: &StepReport) {
+        self.simulated += step.simulated;
         self.substeps += step.substeps;
         self.rejected += step.rejected;
         self.newton_iterations += step.newton_iterations;

@@ -40,3 +40,10 @@ impl Error {
 pub(crate) fn check(what: &'static str, field: &str, value: f64, ok: bool, wanted: &'static str) -> Result<(), Error> {
     if value.is_finite() && ok { Ok(()) } else { Err(Error::invalid(what, field, value, wanted)) }
 }
+
+/// Coordinates for a message, with six digits.
+pub(crate) fn coordinates(p: glam::DVec3) -> String {
+    let digits = |v: f64| format!("{v:.5e}").parse().unwrap_or(v) + 0.0;
+    let [x, y, z] = p.to_array().map(digits);
+    format!("({x}, {y}, {z}) m")
+}

@@ -248,9 +248,9 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 2 is the same without the inputs 21 and 22.
+/// First bytes of a recording: name and version. Version 3 is the same without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const OLDEST: u32 = 2;
 
 impl Recording {
@@ -300,7 +300,7 @@ impl Recording {
 
     /// Reads them back.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Error> {
-        let mut input = Reader { left: bytes };
+        let mut input = Reader { left: bytes, version: VERSION };
         if bytes.len() < MAGIC.len() || &input.array::<8>()? != MAGIC {
             return Err(damaged("it is no recording of input (it does not begin with SUTURAIN)"));
         }
@@ -308,6 +308,7 @@ impl Recording {
         if !(OLDEST..=VERSION).contains(&version) {
             return Err(damaged(format!("recording of version {version}, this build reads versions {OLDEST} to {VERSION}")));
         }
+        input.version = version;
         let inputs = Vec::take(&mut input)?;
         if !input.left.is_empty() {
             return Err(damaged(format!("{} bytes too many", input.left.len())));
@@ -339,6 +340,23 @@ impl<T: Bytes + Copy + Default, const N: usize> Bytes for [T; N] {
     }
 }
 
+impl Bytes for ShapeSpec {
+    fn put(&self, out: &mut Vec<u8>) {
+        let ShapeSpec { geometry, pose, surface, motion, open } = self;
+        geometry.put(out);
+        pose.put(out);
+        surface.put(out);
+        motion.put(out);
+        open.put(out);
+    }
+    fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
+        let (geometry, pose, surface, motion) = (Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?);
+        // Versions 2 and 3 know no meshes that are refused for their holes.
+        let open = if input.version < 4 { true } else { Bytes::take(input)? };
+        Ok(ShapeSpec { geometry, pose, surface, motion, open })
+    }
+}
+
 impl Bytes for Profile {
     fn put(&self, out: &mut Vec<u8>) {
         self.0.put(out);
@@ -358,7 +376,6 @@ structure!(RodSpec { centerline, frames, rest, radius, section, roll, pretwist, 
 structure!(Closure { twist });
 structure!(WeldSpec { places, rest });
 structure!(ReelSpec { rod, at_end, law, supply });
-structure!(ShapeSpec { geometry, pose, surface, motion });
 structure!(GripSpec { rod, place, hold, drive, ramp });
 structure!(LoadSpec { rod, kind });
 variants!(Shear { 0 => Poisson(nu), 1 => Modulus(g) });

@@ -29,6 +29,7 @@ mod step;
 mod view;
 mod world;
 
+pub use collide::overlap::{Overlap, OverlapWith};
 pub use error::Error;
 pub use glam;
 pub use handle::Handle;

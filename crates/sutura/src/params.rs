@@ -176,6 +176,10 @@ pub(crate) fn overlaps(before: f64, now: f64, pressed: f64) -> bool {
     now < -OVERLAP - pressed && now < before - (1e-6 + 2e-4 * room)
 }
 
+/// Overlap, in sums of radii, from which on it is told of what was put there: more than loaded contacts come to, and than the chords of a thread that is led
+/// around something cut off.
+pub(crate) const PRESSED: f64 = 0.1;
+
 /// Distance of centerlines, in sums of radii, that no motion may go below on its way.
 pub(crate) const PASS: f64 = 0.3;
 

@@ -137,7 +137,7 @@ pub(crate) fn held(model: &Model, state: &State, particle: usize) -> bool {
 }
 
 /// Elements that a reel has added to a thread, less those that it took away.
-fn added(state: &State, rod: u32, at_end: bool) -> i32 {
+pub(crate) fn added(state: &State, rod: u32, at_end: bool) -> i32 {
     state.reels.iter().map(|(_, r)| r).find(|r| r.rod == rod && r.at_end == at_end).map_or(0, |r| r.added)
 }
 
@@ -185,6 +185,41 @@ pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'sta
         ends = end + 1;
     }
     if ends == to.rest_length.len() { Ok(()) } else { Err("it is of a world with other threads") }
+}
+
+/// Whether a state that [`check`] has passed has the rest lengths of the model, which now fits the state `from`. Of a thread with a reel the length of the elements
+/// at the reel is compared: what was fed in and drawn back may have come of others.
+pub(crate) fn check_lengths(model: &Model, from: &State, to: &State) -> Result<(), String> {
+    let mut rods: Vec<_> = model.rods.iter().collect();
+    rods.sort_unstable_by_key(|(_, r)| r.first);
+    let mut first = 0;
+    for (slot, rod) in rods {
+        let nominal = |state: &State, at_end: bool| state.reels.iter().map(|(_, r)| r).find(|r| (r.rod, r.at_end) == (slot, at_end)).map(|r| r.nominal);
+        let more: i64 = [false, true].map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end))).iter().sum();
+        let n = (i64::from(rod.n_elements) + more) as usize;
+        let (here, there) = (&model.rest_length[rod.elements()], &to.rest_length[first..first + n]);
+        first += n + 1;
+        let differs = |place: String, here: f64, there: f64| {
+            Err(format!("it is of a world with other threads: of thread {slot}, {place} is {there} m long at rest there, {here} m here"))
+        };
+        let reels = [false, true].map(|at_end| (nominal(from, at_end), nominal(to, at_end)));
+        if reels.iter().all(|(a, b)| a.is_none() && b.is_none()) {
+            if let Some(e) = (0..n).find(|e| !crate::snapshot::same(here[*e], there[*e])) {
+                return differs(format!("element {e}"), here[e], there[e]);
+            }
+            continue;
+        }
+        for (at_end, (now, then)) in reels.into_iter().enumerate() {
+            let at = |lengths: &[f64]| lengths[if at_end == 1 { lengths.len() - 1 } else { 0 }];
+            if now.is_some() || then.is_some() {
+                let (here, there) = (now.unwrap_or(at(here)), then.unwrap_or(at(there)));
+                if !crate::snapshot::same(here, there) {
+                    return differs(format!("an element at the {}", if at_end == 1 { "end" } else { "start" }), here, there);
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Gives the model as many elements in the state `to` as it has in `from`, and their lengths there.

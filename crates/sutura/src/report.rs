@@ -1,5 +1,7 @@
 //! What a step says of itself.
 
+use crate::collide::overlap::{Overlap, OverlapWith};
+use crate::error::coordinates;
 use crate::handle::Handle;
 use crate::model::rod::Rod;
 
@@ -8,6 +10,8 @@ use crate::model::rod::Rod;
 pub struct StepReport {
     /// Simulated time at the end \[s\].
     pub time: f64,
+    /// Of the time wanted, what was simulated \[s\]; the rest passed with everything at rest, as where no acceptable substep was found.
+    pub simulated: f64,
     /// Substeps accepted.
     pub substeps: u32,
     /// Substeps thrown away and done again: as two halves, or with a thread that stretches where it cannot keep its length.
@@ -114,6 +118,9 @@ pub enum IncidentKind {
         /// Distance \[m\].
         distance: f64,
     },
+    /// What was inserted since the last step, or jumped in this one, lies in something. What is only pressed into each other is pushed apart; where a centerline
+    /// passes through, the world goes on as it is, and what contact makes of it is left to chance.
+    Overlap(Overlap),
     /// A time step that is not a finite number > 0, or an input that is not finite: nothing was done.
     BadInput {
         /// Which input.
@@ -142,6 +149,14 @@ impl core::fmt::Display for IncidentKind {
                 write!(f, "no motion keeps an inextensible thread at its length (off by {:.3} %); it stretched as its material does", 100.0 * elongation)
             }
             IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
+            IncidentKind::Overlap(o) => {
+                write!(f, "thread {:?} at {:.4e} m {} ", o.rod, o.arc, o.verb())?;
+                match o.with {
+                    OverlapWith::Rod { rod, arc } => write!(f, "thread {rod:?} at {arc:.4e} m")?,
+                    OverlapWith::Shape(shape) => write!(f, "shape {shape:?}")?,
+                }
+                write!(f, ", {:.3e} m ({:.2} diameters) deep, at {}", o.depth, o.diameters, coordinates(o.point))
+            }
             IncidentKind::BadInput { what } => write!(f, "bad input: {what}; nothing was done"),
             IncidentKind::NotInPaper { what } => write!(f, "the paper's solver does not know {what}; nothing moved"),
             IncidentKind::PassedThrough { .. } => write!(f, "thread passed through"),

@@ -3,14 +3,19 @@
 use crate::error::Error;
 use crate::handle::Slots;
 use crate::math::Pose;
-use crate::model::Model;
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
 use crate::model::reel::ReelLaw;
+use crate::model::rod::RodModel;
+use crate::model::weld::{Member, WeldModel};
+use crate::model::{Model, ShapeModel};
 use crate::state::{GripState, LoadState, Onset, ReelState, ShapeContact, State, ThreadContact};
 use glam::{DQuat, DVec3};
 
-/// First bytes of a snapshot: name and version. What its threads were made of follows, and the state.
-const MAGIC: &[u8; 8] = b"sutura\x04\0";
+/// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
+const MAGIC: &[u8; 8] = b"sutura\x05\0";
+
+/// Those of version 4, which says only what threads were made of.
+const MATERIALS: &[u8; 8] = b"sutura\x04\0";
 
 /// Those of version 3, which does not say what threads were made of. The hash of a state begins with them, whatever the version, so that states of builds
 /// that differ in nothing else can be compared.
@@ -24,6 +29,8 @@ pub(crate) trait Bytes: Sized {
 
 pub(crate) struct Reader<'a> {
     pub left: &'a [u8],
+    /// Version of what is read.
+    pub version: u32,
 }
 
 impl Reader<'_> {
@@ -213,27 +220,169 @@ structure!(State {
     shape_contacts,
 });
 
+structure!(Build { materials, rods, shapes, welds });
+structure!(BuiltRod { slot, n_elements, radius, closed, section, along, rest });
+structure!(BuiltShape { slot, geometry });
+structure!(BuiltWeld { slot, places });
+
+/// What a model was built from, beside the lengths that are in the state: numbers where a message can name them, hashes of the rest.
+pub(crate) struct Build {
+    /// Of materials, and whether threads stretch. These may have changed.
+    pub materials: u64,
+    rods: Vec<BuiltRod>,
+    shapes: Vec<BuiltShape>,
+    welds: Vec<BuiltWeld>,
+}
+
+/// A thread, in the order of the state.
+struct BuiltRod {
+    slot: u32,
+    /// Without what reels added.
+    n_elements: i32,
+    radius: f64,
+    closed: bool,
+    section: u64,
+    /// How section, modulus and density change along it.
+    along: u64,
+    /// Bend and twist at rest; zero is straight.
+    rest: u64,
+}
+
+struct BuiltShape {
+    slot: u32,
+    geometry: u64,
+}
+
+struct BuiltWeld {
+    slot: u32,
+    /// Thread and particle, counted without what reels added.
+    places: Vec<(u32, i32)>,
+}
+
+impl Build {
+    /// That of a model, whose reels are in this state.
+    pub(crate) fn of(model: &Model, state: &State) -> Self {
+        let mut rods: Vec<(u32, &RodModel)> = model.rods.iter().collect();
+        rods.sort_unstable_by_key(|(_, r)| r.first);
+        let rods = rods.into_iter().map(|(slot, rod)| BuiltRod::of(model, state, slot, rod)).collect();
+        let shape = |(slot, s): (u32, &ShapeModel)| BuiltShape { slot, geometry: hash_of(&s.geometry) };
+        let place = |m: &Member| (m.rod, m.particle as i32 - crate::reel::added(state, m.rod, false));
+        let weld = |(slot, w): (u32, &WeldModel)| BuiltWeld { slot, places: w.members.iter().map(place).collect() };
+        Build { materials: made_of(model), rods, shapes: model.shapes.iter().map(shape).collect(), welds: model.welds.iter().map(weld).collect() }
+    }
+
+    /// What another one has that this one has not, in words: `self` is here, `there` in the snapshot.
+    pub(crate) fn unlike(&self, there: &Build) -> Option<String> {
+        let slots = |b: &Build| b.rods.iter().map(|r| r.slot).collect::<Vec<_>>();
+        if slots(self) != slots(there) {
+            return Some(format!("it is of a world with other threads: those in the slots {:?}, here {:?}", slots(there), slots(self)));
+        }
+        let words = |closed: bool| if closed { "closed" } else { "open" };
+        for (here, there) in self.rods.iter().zip(&there.rods) {
+            let differs = if here.n_elements != there.n_elements {
+                format!("it has {} elements there, {} here", there.n_elements, here.n_elements)
+            } else if here.closed != there.closed {
+                format!("it is {} there, {} here", words(there.closed), words(here.closed))
+            } else if !same(here.radius, there.radius) {
+                format!("its radius is {} m there, {} m here", there.radius, here.radius)
+            } else if here.section != there.section {
+                "its cross-section is another there".into()
+            } else if here.along != there.along {
+                "its section, modulus or density changes otherwise along it there".into()
+            } else if here.rest != there.rest {
+                "its rest shape is another there".into()
+            } else {
+                continue;
+            };
+            return Some(format!("it is of a world with other threads: of thread {}, {differs}", here.slot));
+        }
+        let slots = |b: &Build| b.shapes.iter().map(|s| s.slot).collect::<Vec<_>>();
+        if slots(self) != slots(there) {
+            return Some(format!("it is of a world with other shapes: those in the slots {:?}, here {:?}", slots(there), slots(self)));
+        }
+        if let Some((here, _)) = self.shapes.iter().zip(&there.shapes).find(|(a, b)| a.geometry != b.geometry) {
+            return Some(format!("it is of a world with other shapes: the geometry of shape {} is another there", here.slot));
+        }
+        let welds = |b: &Build| b.welds.iter().map(|w| (w.slot, w.places.clone())).collect::<Vec<_>>();
+        (welds(self) != welds(there)).then(|| "it is of a world with other welds".into())
+    }
+}
+
+impl BuiltRod {
+    fn of(model: &Model, state: &State, slot: u32, rod: &RodModel) -> Self {
+        let added = [false, true].map(|at_end| crate::reel::added(state, slot, at_end));
+        // What reels add is like its neighbors and straight at rest: the same factors once, and the places that are not straight.
+        let mut along = model.factors[rod.elements()].iter().map(|f| [f.size, f.modulus, f.density]).collect::<Vec<_>>();
+        along.dedup();
+        let mut rest = Vec::new();
+        for (k, q) in model.rest_half[rod.elements()].iter().enumerate().filter(|(_, q)| **q != DQuat::IDENTITY) {
+            (k as i32 - added[0]).put(&mut rest);
+            q.put(&mut rest);
+        }
+        let seam = model.weld_of[rod.first as usize].filter(|w| model.weld_of[rod.particles().end - 1] == Some(*w));
+        // The rest shape at the seam, as it was closed.
+        let members = seam.and_then(|w| model.welds.at(w)).map_or(&[][..], |w| &w.members);
+        for side in members.iter().flat_map(|m| [m.before, m.after]).flatten().filter(|s| s.section == DQuat::IDENTITY) {
+            side.rest_half.put(&mut rest);
+        }
+        BuiltRod {
+            slot,
+            n_elements: rod.n_elements as i32 - added[0] - added[1],
+            radius: rod.radius,
+            closed: seam.is_some(),
+            section: hash_of(&(rod.section, rod.section_radius)),
+            along: hash_of(&along),
+            rest: fnv(&rest),
+        }
+    }
+}
+
+/// Whether two lengths are the same but for rounding of how they were worked out.
+pub(crate) fn same(a: f64, b: f64) -> bool {
+    const ROUNDING: f64 = 1e-9;
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
+fn hash_of(value: &impl Bytes) -> u64 {
+    let mut bytes = Vec::new();
+    value.put(&mut bytes);
+    fnv(&bytes)
+}
+
 /// A snapshot of the state of a model.
-pub(crate) fn write(state: &State, made_of: u64) -> Vec<u8> {
+pub(crate) fn write(model: &Model, state: &State) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
-    made_of.put(&mut out);
+    Build::of(model, state).put(&mut out);
     state.put(&mut out);
     out
 }
 
-/// What threads were made of, where the snapshot says so, and the state.
-pub(crate) fn read(bytes: &[u8]) -> Result<(Option<u64>, State), Error> {
-    let mut input = Reader { left: bytes };
-    let made_of = match &input.array::<8>()? {
-        MAGIC => Some(u64::take(&mut input)?),
-        BARE => None,
+/// A snapshot as it was read.
+pub(crate) struct Snapshot {
+    /// What threads were made of, where it says so.
+    pub materials: Option<u64>,
+    /// What the world was built from, where it says so.
+    pub build: Option<Build>,
+    pub state: State,
+}
+
+/// Reads a snapshot of this version or of one of the two before it.
+pub(crate) fn read(bytes: &[u8]) -> Result<Snapshot, Error> {
+    let mut input = Reader { left: bytes, version: 0 };
+    let (materials, build) = match &input.array::<8>()? {
+        MAGIC => {
+            let build = Build::take(&mut input)?;
+            (Some(build.materials), Some(build))
+        }
+        MATERIALS => (Some(u64::take(&mut input)?), None),
+        BARE => (None, None),
         _ => return Err(damaged("it does not start as a snapshot of this version")),
     };
     let state = State::take(&mut input)?;
     if !input.left.is_empty() {
         return Err(damaged(format!("{} bytes too many", input.left.len())));
     }
-    Ok((made_of, state))
+    Ok(Snapshot { materials, build, state })
 }
 
 /// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a state are of these.

@@ -58,6 +58,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
         let held = scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
         grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
     }
+    report.simulated = reached * interval.length;
     state.time = interval.start + interval.length;
 }
 

@@ -1,5 +1,6 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
+use crate::collide::overlap::{Overlap, OverlapWith};
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
@@ -7,13 +8,14 @@ use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, 
 use crate::model::material::Material;
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
-use crate::model::shape::{Shape, ShapeMotion, ShapeSpec};
+use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
-use crate::model::{Model, ShapeModel};
+use crate::model::{Model, Placed, ShapeModel};
 use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::row;
 use crate::scratch::Scratch;
+use crate::snapshot::{Build, Snapshot};
 use crate::state::{GripState, LoadState, Onset, ReelState, State};
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
@@ -115,6 +117,7 @@ impl World {
             surface: spec.surface,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
+        model.placed.rods.push(handle.index);
         for e in 0..=n {
             // The last entry is no element; its stiffness is never used.
             let section = low.sections[e.min(n - 1)];
@@ -408,14 +411,11 @@ impl World {
 
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
-        spec.validate()?;
-        let shape = ShapeModel {
-            geometry: spec.geometry.clone(),
-            collider: crate::collide::Collider::new(&spec.geometry)?,
-            surface: spec.surface,
-            motion: spec.motion,
-        };
+        let Checked { geometry, closed, container, notes } = spec.check()?;
+        let collider = crate::collide::Collider::new(&geometry)?;
+        let shape = ShapeModel { geometry, collider, surface: spec.surface, motion: spec.motion, closed, container, notes };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
+        self.model.placed.shapes.push(handle.index);
         let n = self.model.shapes.len();
         self.state.shape_pose.resize(n, Pose::IDENTITY);
         self.state.shape_target.resize(n, Pose::IDENTITY);
@@ -689,6 +689,15 @@ impl World {
         let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
         Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], motion: s.motion, surface: s.surface, slot: shape.index() })
     }
+    /// What was mended of a mesh when it was inserted, and what may not have been meant: that it is open and where, that it is a container. Each is a
+    /// sentence without its full stop.
+    pub fn shape_notes(&self, shape: Handle<Shape>) -> Result<&[String], Error> {
+        Ok(&self.model.shapes.get(shape).ok_or(SHAPE)?.notes)
+    }
+    /// Whether a shape has an inside: all but open meshes.
+    pub fn shape_is_closed(&self, shape: Handle<Shape>) -> Result<bool, Error> {
+        Ok(self.model.shapes.get(shape).ok_or(SHAPE)?.closed)
+    }
     /// Reads everything.
     pub fn view(&self) -> View<'_> {
         View { model: &self.model, state: &self.state }
@@ -725,6 +734,13 @@ impl World {
         threads.chain(shapes)
     }
 
+    /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it. What neighbors along a thread or through
+    /// a weld is left out, and so is what overlaps by less than a tenth of a diameter, as loaded contacts and arcs cut into chords do. The first step after
+    /// [`World::insert_rod`] and [`World::insert_shape`] says it of what was inserted ([`IncidentKind::Overlap`]).
+    pub fn overlaps(&self) -> Vec<Overlap> {
+        crate::collide::overlap::overlaps(&self.model, &self.state)
+    }
+
     /// Simulated time \[s\].
     pub fn time(&self) -> f64 {
         self.state.time
@@ -748,10 +764,13 @@ impl World {
             report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is more than a million substeps" } });
             return report;
         }
-        self.report_teleports(dt, &mut report);
+        let placed = core::mem::take(&mut self.model.placed);
+        self.report_overlaps(&placed, &mut report);
+        let teleported = self.report_teleports(dt, &mut report);
         let mut interval = crate::step::Interval { start, length: dt, observe };
         crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
         report.time = self.state.time;
+        self.report_overlaps(&teleported, &mut report);
         if self.model.settings.solver == Solver::Direct {
             report.contacts = self.contacts().count() as u32;
         }
@@ -759,17 +778,44 @@ impl World {
         report
     }
 
-    /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
-    fn report_teleports(&self, dt: f64, report: &mut StepReport) {
-        const FASTEST: f64 = 100.0;
-        // What a force moves has no target; the one that it had stays behind.
-        let led = self.state.grips.iter().filter(|(_, g)| g.drive == Drive::Pose);
-        let grips = led.map(|(_, g)| (g.target.position - g.pose.position).length());
-        let driven = self.model.shapes.iter().filter(|(_, s)| s.motion == ShapeMotion::Driven);
-        let shapes = driven.map(|(k, _)| (self.state.shape_target[k as usize].position - self.state.shape_pose[k as usize].position).length());
-        for distance in grips.chain(shapes).filter(|d| *d > FASTEST * dt) {
-            report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
+    /// What was put where something is already is told; contact does with it what it can.
+    fn report_overlaps(&self, placed: &Placed, report: &mut StepReport) {
+        if placed.rods.is_empty() && placed.shapes.is_empty() {
+            return;
         }
+        let put = |rod: Handle<Rod>| placed.rods.contains(&rod.index);
+        let one = |o: &Overlap| match o.with {
+            OverlapWith::Rod { rod, .. } => put(o.rod) || put(rod),
+            OverlapWith::Shape(shape) => put(o.rod) || placed.shapes.contains(&shape.index),
+        };
+        let time = report.time;
+        report.incidents.extend(self.overlaps().into_iter().filter(one).map(|o| Incident { time, kind: IncidentKind::Overlap(o) }));
+    }
+
+    /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
+    fn report_teleports(&self, dt: f64, report: &mut StepReport) -> Placed {
+        const FASTEST: f64 = 100.0;
+        let mut placed = Placed::default();
+        let mut tell = |distance: f64| {
+            let far = distance > FASTEST * dt;
+            if far {
+                report.incidents.push(Incident { time: report.time, kind: IncidentKind::Teleport { distance } });
+            }
+            far
+        };
+        // What a force moves has no target; the one that it had stays behind.
+        for (_, g) in self.state.grips.iter().filter(|(_, g)| g.drive == Drive::Pose) {
+            if tell((g.target.position - g.pose.position).length()) {
+                placed.rods.push(g.rod);
+            }
+        }
+        for (slot, _) in self.model.shapes.iter().filter(|(_, s)| s.motion == ShapeMotion::Driven) {
+            let k = slot as usize;
+            if tell((self.state.shape_target[k].position - self.state.shape_pose[k].position).length()) {
+                placed.shapes.push(slot);
+            }
+        }
+        placed
     }
 
     fn length_error(&self) -> f64 {
@@ -786,24 +832,30 @@ impl World {
 
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
     pub fn snapshot(&self) -> Vec<u8> {
-        crate::snapshot::write(&self.state, crate::snapshot::made_of(&self.model))
+        crate::snapshot::write(&self.model, &self.state)
     }
 
-    /// Takes the world back to a snapshot of a world with the same threads and shapes. On error nothing is changed.
+    /// Takes the world back to a snapshot of a world with the same threads, shapes and welds. On error nothing is changed; it says what differs: number and
+    /// rest lengths of elements, radius, section, rest shape, whether a thread is closed, the geometry of a shape, the places of a weld. (Of a snapshot of an
+    /// earlier version lengths and numbers are compared, since it says no more.)
     ///
     /// Materials, settings and friction are the model's: they stay as they are now. Where threads were of another material, or stretched otherwise, when the
     /// snapshot was taken, its strains, velocities and plastic set are taken over, tensions follow the strains, and the integrator starts anew, as if
     /// [`World::set_material`] came after it. Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let (made_of, state) = crate::snapshot::read(bytes)?;
+        let Snapshot { materials, build, state } = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
+        if let Some(reason) = build.and_then(|there| Build::of(&self.model, &self.state).unlike(&there)) {
+            return Err(Error::Snapshot { reason });
+        }
         crate::reel::check(&self.model, &self.state, &state).map_err(refused)?;
+        crate::reel::check_lengths(&self.model, &self.state, &state).map_err(|reason| Error::Snapshot { reason })?;
         let before = self.state.clone();
         crate::reel::refit(&mut self.model, &before, &state);
         let fits = self.check_fit(&state);
         if fits.is_ok() {
             self.take_up(&state);
-            if made_of.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
+            if materials.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
                 self.state.interrupt(Onset::Unknown);
                 self.follow_strain(0..self.model.mass.len());
             }

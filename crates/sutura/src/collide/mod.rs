@@ -1,5 +1,6 @@
 //! Which pieces may touch, and whether a substep's motion was allowed. Knows positions only; what contacts do is in `row`.
 
+pub(crate) mod overlap;
 pub(crate) mod segment;
 mod shape;
 mod tree;

@@ -6,7 +6,7 @@ use crate::math::Pose;
 use crate::model::shape::Geometry;
 use glam::DVec3;
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::query::{PointQuery, PointQueryWithLocation};
+use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
 use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, Shape, TriMesh, TriMeshFlags, TrianglePointLocation};
 
 /// A geometry ready for queries.
@@ -268,6 +268,12 @@ impl Surface {
             mesh.set_flags(TriMeshFlags::ORIENTED).map_err(|e| bad(&e))?;
         }
         Ok(Surface { mesh, closed, edges, edges_of })
+    }
+
+    /// Where a segment (body frame) crosses the surface first, as a part of its length.
+    pub fn crossing(&self, ends: [DVec3; 2]) -> Option<f64> {
+        let [from, to] = ends.map(to_parry);
+        self.mesh.cast_local_ray(&Ray::new(from, to - from), 1.0, false)
     }
 
     /// Triangles near a segment.

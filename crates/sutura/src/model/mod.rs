@@ -2,6 +2,7 @@
 
 pub mod grip;
 pub mod material;
+pub mod mesh;
 pub mod reel;
 pub mod rod;
 pub mod section;
@@ -31,6 +32,8 @@ pub struct Model {
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
     pub(crate) welds: Slots<WeldModel>,
+    /// What was put into the world since the last step, which the next one looks at.
+    pub(crate) placed: Placed,
     /// Friction of pairs of surfaces, smaller index first, sorted.
     pub(crate) friction: Vec<((u32, u32), Friction)>,
 
@@ -65,12 +68,25 @@ pub struct Model {
     pub(crate) bend_damping: Vec<f64>,
 }
 
+/// Slots of threads and shapes that were put somewhere, not moved there.
+#[derive(Debug, Default)]
+pub(crate) struct Placed {
+    pub rods: Vec<u32>,
+    pub shapes: Vec<u32>,
+}
+
 /// A shape, checked and ready for queries.
 pub(crate) struct ShapeModel {
     pub geometry: Geometry,
     pub collider: crate::collide::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,
+    /// Whether a mesh is closed, so that it has an inside; of the other shapes true.
+    pub closed: bool,
+    /// Whether part of a mesh is a container, around which everything is solid.
+    pub container: bool,
+    /// What was mended of a mesh, and what a user may not have meant.
+    pub notes: Vec<String>,
 }
 
 impl Model {

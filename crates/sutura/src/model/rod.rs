@@ -252,6 +252,16 @@ impl RodSpec {
                 return Err(Error::invalid(what, format!("centerline[{i}..{}]", i + 1), l, "neighboring points farther apart than radius / 1000"));
             }
         }
+        if closed {
+            // One that turns back on itself lies in itself there, and no seam holds it so.
+            const SHARPEST: f64 = 3.0;
+            let along = |i: usize| (points[i % n + 1] - points[i % n]).normalize();
+            let sharp = (1..=n).map(|i| (i, log(rotation_arc(along(i - 1), along(i))).length())).find(|(_, turn)| *turn > SHARPEST);
+            if let Some((i, turn)) = sharp {
+                let (field, value) = (format!("centerline[{}]", i % n), format!("a turn by {turn:.2} rad"));
+                return Err(Error::Invalid { what, field, value, wanted: "a closed thread that nowhere turns back on itself (by more than 3 rad)" });
+            }
+        }
         let mut frames = match &self.frames {
             Some(f) => {
                 if f.len() != n {

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, check};
 use crate::math::Pose;
+use crate::model::mesh::{self, CheckedMesh};
 use glam::DVec3;
 
 /// A shape. Marker of [`Handle`](crate::Handle).
@@ -19,6 +20,8 @@ pub struct ShapeSpec {
     pub surface: u32,
     /// What moves it.
     pub motion: ShapeMotion,
+    /// Whether a mesh that would be closed but for small holes is meant so. It is then a sheet with two sides; else it is refused.
+    pub open: bool,
 }
 
 /// Geometry in the body frame, lengths in meters. All but the plane and an open mesh are solid.
@@ -50,7 +53,9 @@ pub enum Geometry {
         /// Half the side along each axis \[m\].
         half_sides: DVec3,
     },
-    /// A triangle mesh. Threads stay on the side on which they are when they first come near.
+    /// A triangle mesh, corners counterclockwise as seen from outside. A closed one is solid, or a container where its normals point inward; of an open one
+    /// threads stay on the side on which they are when they first come near. What was mended when it was inserted, and whether it is open, says
+    /// [`World::shape_notes`](crate::World::shape_notes).
     Mesh {
         /// Corners \[m\].
         vertices: Vec<DVec3>,
@@ -80,10 +85,10 @@ pub enum ShapeMotion {
 impl ShapeSpec {
     /// A fixed shape.
     pub fn fixed(geometry: Geometry, pose: Pose) -> Self {
-        ShapeSpec { geometry, pose, surface: 0, motion: ShapeMotion::Fixed }
+        ShapeSpec { geometry, pose, surface: 0, motion: ShapeMotion::Fixed, open: false }
     }
 
-    pub(crate) fn validate(&self) -> Result<(), Error> {
+    fn validate(&self) -> Result<(), Error> {
         let what = "shape";
         if !self.pose.is_valid() {
             return Err(Error::invalid(what, "pose", self.pose, "finite, with a unit quaternion"));
@@ -101,27 +106,31 @@ impl ShapeSpec {
                 length("half_sides.y", half_sides.y)?;
                 length("half_sides.z", half_sides.z)?;
             }
-            Geometry::Mesh { vertices, triangles } => {
-                if let Some(i) = vertices.iter().position(|v| !crate::math::is_place(*v)) {
-                    return Err(Error::invalid(what, format!("vertices[{i}]"), vertices[i], "finite coordinates whose squares are finite too [m]"));
-                }
-                if triangles.is_empty() {
-                    return Err(Error::invalid(what, "triangles", "none", "at least one triangle"));
-                }
-                for (i, t) in triangles.iter().enumerate() {
-                    let corner = |k: usize| vertices.get(t[k] as usize).copied();
-                    let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
-                        return Err(Error::invalid(what, format!("triangles[{i}]"), t, "indices of vertices"));
-                    };
-                    let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-                    if (b - a).cross(c - a).length() <= 1e-12 * longest * longest {
-                        return Err(Error::invalid(what, format!("triangles[{i}]"), t, "a triangle with an area"));
-                    }
-                }
-            }
+            // By `check`.
+            Geometry::Mesh { .. } => {}
         }
         self.motion.validate()
     }
+
+    /// The geometry checked, of a mesh as it was mended.
+    pub(crate) fn check(&self) -> Result<Checked, Error> {
+        self.validate()?;
+        let Geometry::Mesh { vertices, triangles } = &self.geometry else {
+            return Ok(Checked { geometry: self.geometry.clone(), closed: true, container: false, notes: Vec::new() });
+        };
+        let CheckedMesh { vertices, triangles, closed, container, notes } = mesh::check(vertices, triangles, self.open)?;
+        Ok(Checked { geometry: Geometry::Mesh { vertices, triangles }, closed, container, notes })
+    }
+}
+
+/// The geometry of a shape, checked.
+pub(crate) struct Checked {
+    pub geometry: Geometry,
+    /// Whether it has an inside.
+    pub closed: bool,
+    pub container: bool,
+    /// What was mended, and what a user may not have meant.
+    pub notes: Vec<String>,
 }
 
 impl ShapeMotion {

@@ -68,6 +68,7 @@ pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, inte
     for (_, grip) in state.grips.iter_mut() {
         grip.pose = grip.pose.interpolate(&grip.target, reached);
     }
+    report.simulated = reached * interval.length;
     state.time = interval.start + interval.length;
 }
 

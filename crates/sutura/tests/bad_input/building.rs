@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_usable, point, step, straight, thread};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section, Settings,
-    ShapeMotion, ShapeSpec, Shear, World,
+    Closure, Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section,
+    Settings, ShapeMotion, ShapeSpec, Shear, World,
 };
 
 /// An error of the kind that names a field, and the field.
@@ -136,6 +136,20 @@ fn threads_that_cannot_be() {
         assert_eq!(world.state_hash(), before, "an error changes nothing");
     }
     assert_usable(&mut world, 2, "after the errors");
+}
+
+#[test]
+fn a_closed_thread_that_turns_back_on_itself() {
+    let (material, radius) = t1();
+    let (mut world, _) = thread(Settings::default());
+    let closed = |centerline: Vec<DVec3>| RodSpec { closure: Some(Closure::default()), ..RodSpec::new(centerline, radius, material.clone()) };
+    // A line: back from its end through all of it. A fold in a ring.
+    let line: Vec<DVec3> = (0..=20).map(|i| DVec3::X * (0.0025 * f64::from(i))).collect();
+    assert_eq!(invalid(world.insert_rod(&closed(line))), "centerline[20]");
+    let mut ring = RodSpec::ring(DVec3::ZERO, DVec3::Z, DVec3::X * 0.02, 24, radius, material.clone()).centerline;
+    assert!(world.insert_rod(&closed(ring.clone())).is_ok());
+    ring[7] = ring[5].lerp(ring[6], 0.5);
+    assert_eq!(invalid(world.insert_rod(&closed(ring))), "centerline[6]");
 }
 
 #[test]

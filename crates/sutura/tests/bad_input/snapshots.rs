@@ -4,7 +4,10 @@ use crate::support::t1;
 use crate::{DT, NAN, assert_finite, assert_usable, point, straight, thread};
 use proptest::prelude::*;
 use sutura::glam::DVec3;
-use sutura::{Drive, Error, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, RodSpec, Settings, ShapeMotion, ShapeSpec, World};
+use sutura::{
+    Along, Drive, Error, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, ReelLaw, ReelSpec, RestShape, Rod,
+    RodSpec, Section, Settings, ShapeMotion, ShapeSpec, WeldSpec, World,
+};
 
 /// A world with all that a snapshot holds: two threads that touch, on a plane, grips of all kinds, loads, a driven and a removed shape.
 fn full_world() -> World {
@@ -83,6 +86,108 @@ fn a_snapshot_of_another_world() {
     other.remove_rod(rod).unwrap();
     assert!(restore_damaged(&mut other, &taken).is_err());
     assert_usable(&mut other, 1, "other");
+}
+
+/// A thread, a ring, a shape and a weld, one of which is otherwise.
+#[derive(Clone)]
+struct Parts {
+    length: f64,
+    elements: usize,
+    radius: f64,
+    rest: RestShape,
+    section: Section,
+    along: Along,
+    closed: bool,
+    geometry: Geometry,
+    weld: Place,
+    reel: bool,
+}
+
+impl Parts {
+    fn world(&self) -> World {
+        self.build().0
+    }
+    fn build(&self) -> (World, Handle<Rod>) {
+        let mut world = World::new(Settings::default()).unwrap();
+        let thread = RodSpec::straight(DVec3::ZERO, DVec3::X * self.length, self.elements, self.radius, t1().0);
+        let a = world.insert_rod(&RodSpec { rest: self.rest.clone(), section: self.section, along: self.along.clone(), ..thread }).unwrap();
+        let ring = RodSpec::ring(DVec3::Y * 0.05, DVec3::Z, DVec3::X * 0.02, 24, 0.16e-3, t1().0);
+        let points = ring.centerline.iter().copied().chain((!self.closed).then(|| ring.centerline[0] + DVec3::Z * 1e-3)).collect();
+        let ring = world.insert_rod(&RodSpec { centerline: points, closure: self.closed.then(Default::default), ..ring }).unwrap();
+        world.insert_shape(&ShapeSpec::fixed(self.geometry.clone(), Pose::at(DVec3::Z * -0.2))).unwrap();
+        let from = world.rod(ring).unwrap().positions()[12];
+        let other = world.insert_rod(&RodSpec::straight(from, from + DVec3::Z * 0.02, 10, 0.16e-3, t1().0)).unwrap();
+        // The ring's own weld is at its start.
+        world.insert_weld(&WeldSpec::new(vec![(ring, self.weld), (other, Place::Start)])).ok();
+        if self.reel {
+            world.insert_reel(&ReelSpec { rod: a, at_end: true, law: ReelLaw::Rate(0.05), supply: None }).unwrap();
+        }
+        (world, a)
+    }
+}
+
+#[test]
+fn a_snapshot_of_a_world_that_is_built_otherwise_is_refused_and_says_what_differs() {
+    let parts = Parts {
+        length: 0.05,
+        elements: 20,
+        radius: 0.16e-3,
+        rest: RestShape::Straight,
+        section: Section::Round,
+        along: Along::default(),
+        closed: true,
+        geometry: Geometry::Sphere { radius: 0.01 },
+        weld: Place::Particle(12),
+        reel: false,
+    };
+    let mut world = parts.world();
+    for _ in 0..3 {
+        world.step(DT);
+    }
+    let snapshot = world.snapshot();
+    let bent = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::X; 19]) };
+    let thinner = Along { size: Profile(vec![(0.0, 1.0), (0.05, 0.5)]), ..Along::default() };
+    let sheet = |z: f64| Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, z)], triangles: vec![[0, 1, 2]] };
+    for (other, words) in [
+        (Parts { length: 0.1, ..parts.clone() }, &["thread 0", "element 0", "0.0025", "0.005"][..]),
+        (Parts { elements: 25, ..parts.clone() }, &["thread 0", "20 elements there, 25 here"]),
+        (Parts { radius: 5e-3, ..parts.clone() }, &["thread 0", "radius", "0.00016", "0.005"]),
+        (Parts { rest: bent, ..parts.clone() }, &["thread 0", "rest shape"]),
+        (Parts { section: Section::Ellipse([1e-4, 2e-4]), ..parts.clone() }, &["thread 0", "cross-section"]),
+        (Parts { along: thinner, ..parts.clone() }, &["thread 0", "along"]),
+        (Parts { closed: false, ..parts.clone() }, &["thread 1", "closed there, open here"]),
+        (Parts { geometry: Geometry::Box { half_sides: DVec3::splat(0.06) }, ..parts.clone() }, &["shape 0", "geometry"]),
+        (Parts { geometry: Geometry::Sphere { radius: 0.011 }, ..parts.clone() }, &["shape 0", "geometry"]),
+        (Parts { geometry: sheet(0.1), ..parts.clone() }, &["shape 0", "geometry"]),
+        (Parts { weld: Place::Particle(11), ..parts.clone() }, &["welds"]),
+    ] {
+        let mut other = other.world();
+        let error = restore_damaged(&mut other, &snapshot).unwrap_err().to_string();
+        assert!(words.iter().all(|w| error.contains(w)), "{error}: {words:?}");
+        let own = other.snapshot();
+        assert!(other.restore(&own).is_ok() && other.snapshot() == own);
+    }
+    let (mut same, rod) = parts.build();
+    same.restore(&snapshot).unwrap();
+    assert_eq!(same.state_hash(), world.state_hash());
+    same.set_material(rod, &Material::elastic(1e9, 900.0)).unwrap();
+    same.restore(&snapshot).unwrap();
+    // Length fed in since does not matter, but what is on the reel does.
+    let reeled = Parts { reel: true, ..parts.clone() };
+    let mut fed = reeled.world();
+    for _ in 0..20 {
+        fed.step(DT);
+    }
+    let snapshot = fed.snapshot();
+    for mut before in [reeled.world(), parts.world()] {
+        before.restore(&snapshot).unwrap();
+        assert_eq!(before.state_hash(), fed.state_hash());
+    }
+    let error = restore_damaged(&mut Parts { length: 0.06, ..reeled.clone() }.world(), &snapshot).unwrap_err().to_string();
+    assert!(error.contains("thread 0") && error.contains("at the end"), "{error}");
+    let error = restore_damaged(&mut Parts { length: 0.06, ..parts.clone() }.world(), &snapshot).unwrap_err().to_string();
+    assert!(error.contains("thread 0") && error.contains("at the end"), "{error}");
+    assert!(restore_damaged(&mut Parts { radius: 0.2e-3, ..reeled }.world(), &snapshot).is_err());
 }
 
 #[test]

@@ -40,6 +40,8 @@ pub struct Hands {
     pub verbose: bool,
 }
 
+/// Seed of all of them.
+const SEED: u64 = 0x6861_6e64;
 /// Threads that take turns.
 const THREADS: [(&str, &str); 3] = [("2-0", "silk"), ("3-0", "silk"), ("2-0", "nylon")];
 /// Length of a thread, and of an element \[m\].
@@ -124,7 +126,7 @@ impl Pair {
         let lying = DQuat::from_rotation_x(core::f64::consts::FRAC_PI_2);
         world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: 0.03 }, Pose::new(lift, lying))).map_err(text)?;
         world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::at(DVec3::Z * TABLE))).map_err(text)?;
-        let mut draw = Draw::seed(0x68_61_6e_64, number);
+        let mut draw = Draw::seed(SEED, number);
         let hands = [0, 1].map(|_| Hand {
             held: None,
             at: DVec3::ZERO,

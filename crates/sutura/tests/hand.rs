@@ -84,7 +84,7 @@ fn drawn_across_its_direction_it_gives_way_where_a_force_along_a_line_does_not()
         let mut most = 0.0f64;
         for _ in 0..180 {
             let pose = world.grip_pose(other).unwrap();
-            world.set_grip_pose(other, sutura::Pose::new(pose.position + DVec3::Y * (0.02 * DT), pose.orientation)).unwrap();
+            world.set_grip_pose(other, Pose::new(pose.position + DVec3::Y * (0.02 * DT), pose.orientation)).unwrap();
             world.step(DT);
             most = most.max(world.grip_wrench(hand).unwrap().force.length());
         }

@@ -295,9 +295,7 @@ fn what_is_thinner_than_a_step_is_not_missed() {
     let lying = DQuat::from_rotation_y(core::f64::consts::FRAC_PI_2);
     for (geometry, orientation) in [(plate, DQuat::IDENTITY), (wire, lying), (needle, lying)] {
         let at = |y: f64, z: f64| Pose::new(DVec3::new(0.0, y, z), orientation);
-        for (y, from, to, through) in
-            [(0.9e-3, -5e-3, 5e-3, true), (0.1e-3, 5e-3, -3e-3, true), (0.9e-3, -5e-3, -1.0 * R, false), (0.2e-3, 5e-3, 0.8 * R, false)]
-        {
+        for (y, from, to, through) in [(0.9e-3, -5e-3, 5e-3, true), (0.1e-3, 5e-3, -3e-3, true), (0.9e-3, -5e-3, -R, false), (0.2e-3, 5e-3, 0.8 * R, false)] {
             assert_eq!(passes(&geometry, (&at(y, from), &thread), (&at(y, to), &thread)), through, "{geometry:?} {from} {to}");
             // Both move, as fast as the shape alone did and across that.
             let carried = shifted(&thread, DVec3::new(4e-3, 0.0, 0.0));

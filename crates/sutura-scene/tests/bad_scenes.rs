@@ -252,3 +252,20 @@ proptest! {
         let _ = Scene::parse(&text, "mangled.toml");
     }
 }
+
+/// Each series is a file of its name.
+#[test]
+fn two_series_of_one_name_are_an_error() {
+    let scene = |profiles: &str| {
+        format!(
+            "[[thread]]\nname = \"a\"\ndiameter = \"0.2 mm\"\nyoung_modulus = \"1 GPa\"\ndensity = \"1 g/cc\"\nelements = 4\nline = {{ from = [0, 0, 0], to = \"[9, 0, 0] mm\" }}\n\
+             [[phase]]\nduration = \"0.1 s\"\n[[probe]]\nname = \"pull\"\nwhat = \"tension(a)\"\n{profiles}"
+        )
+    };
+    let profile = |name: &str| format!("[[profile]]\nname = \"{name}\"\nwhat = \"tension\"\n");
+    assert!(Scene::parse(&scene(&(profile("along") + &profile("later"))), "s.toml").is_ok());
+    for taken in [profile("pull"), profile("frame"), profile("along") + &profile("along")] {
+        let error = Scene::parse(&scene(&taken), "s.toml").unwrap_err().to_string();
+        assert!(error.contains("is taken"), "{error}");
+    }
+}

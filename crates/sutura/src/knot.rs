@@ -519,7 +519,7 @@ impl fmt::Display for Recognition {
     /// Such as `square knot (3_1 # m3_1), det 9, signature 0`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.knot == KnotType::Unknown && self.is_certain() {
-            write!(f, "knot without a name here")?;
+            write!(f, "{}", self.name())?;
         } else {
             write!(f, "{}", self.knot)?;
         }

@@ -372,7 +372,7 @@ fn what_is_recognized_reads_well() {
     assert_eq!(r.to_string(), "square knot (3_1 # m3_1), det 9, signature 0");
     assert_eq!(r.knot.name(), "square");
     let r = recognize(&closed_braid(3, &[1, 1, 1, -2, -1, -1, -1, -2]), Ends::Closed, 0);
-    assert_eq!(r.to_string(), "unknown, det 9, signature 0, 8 crossings");
+    assert_eq!(r.to_string(), "unnamed, det 9, signature 0, 8 crossings");
     for (_, knot, ..) in stacks() {
         assert!(KnotType::NAMES.contains(&knot.name()) && KnotType::NAMES.contains(&mirror(knot).name()));
     }

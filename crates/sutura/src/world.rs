@@ -125,7 +125,6 @@ impl World {
             model.rest_length.push(after);
             state.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
-            model.offset.push(0.0);
             model.factors.push(low.factors[e.min(n - 1)]);
             model.section.push(section);
             model.stretch_stiffness.push(DVec3::splat(section.ea));
@@ -233,7 +232,6 @@ impl World {
             model.inertia,
             model.rest_length,
             model.inextensible,
-            model.offset,
             model.stretch_stiffness,
             model.joint_length,
             model.bend_stiffness,

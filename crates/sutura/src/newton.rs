@@ -2,8 +2,8 @@
 //!
 //! The substep minimizes inertia + elastic energy + contact (implicit Euler). Stretch is linearized with its multiplier: the geometric
 //! stiffness uses the tension that the last iteration predicted, not the one of the current strain, which makes the iteration that of
-//! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. For inextensible
-//! rods that multiplier also enters the residual (method of multipliers); its penalty is 100 EA.
+//! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. In
+//! inextensible rods that tension is an unknown of its own, eliminated in its element, whose stiffness is 1e5 EA (theory 7.1).
 
 use crate::math::exp;
 use crate::model::Model;

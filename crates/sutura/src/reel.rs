@@ -265,20 +265,7 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! without {
         ($($array:ident),*) => {$( $array.remove(e + 1); )*};
     }
-    without!(
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        rest_half,
-        stretch_stiffness,
-        inextensible,
-        bend_stiffness,
-        bend_damping
-    );
+    without!(mass, rod_of, rest_length, factors, section, inertia, joint_length, rest_half, stretch_stiffness, inextensible, bend_stiffness, bend_damping);
     shift_model(rods, rod, e, -1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {

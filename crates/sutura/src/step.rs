@@ -185,7 +185,8 @@ fn tautest(model: &Model, scratch: &Scratch) -> f64 {
 /// Inextensible threads that the last attempt found as `taut`, over E A, or more stretch as their material does from here to the end of the step.
 /// Whether there are any.
 fn let_stretch(model: &Model, state: &State, scratch: &mut Scratch, taut: f64) -> bool {
-    let found: Vec<_> = keeping(model, scratch).map(|rod| (rod.elements(), most_pulled(model, scratch, rod))).filter(|(_, pulled)| pulled.abs() >= taut).collect();
+    let found: Vec<_> =
+        keeping(model, scratch).map(|rod| (rod.elements(), most_pulled(model, scratch, rod))).filter(|(_, pulled)| pulled.abs() >= taut).collect();
     for (elements, pulled) in &found {
         for e in elements.clone() {
             let ea = model.section[e].ea;

@@ -53,7 +53,7 @@ pub struct Model {
     pub(crate) joint_length: Vec<f64>,
     /// Square root of the rest rotation of the joint between `e - 1` and `e`.
     pub(crate) rest_half: Vec<DQuat>,
-    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; for inextensible rods that of the multiplier's penalty) \[N/m\].
+    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; of inextensible rods along the line between its ends) \[N/m\].
     pub(crate) stretch_stiffness: Vec<DVec3>,
     /// Whether each element is one of an inextensible thread.
     pub(crate) inextensible: Vec<bool>,

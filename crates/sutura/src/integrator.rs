@@ -17,7 +17,7 @@ use crate::params::Integrator;
 use crate::rod::strain;
 use crate::scratch::Scratch;
 use crate::state::{Onset, State};
-use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
+use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use glam::DVec3;
 
 /// How a substep is taken.
@@ -52,10 +52,9 @@ const SPAN: f64 = 1.0 - FRAC_1_SQRT_2;
 
 impl Method {
     /// The method for the next substep, of length `h`.
-    pub fn of(model: &Model, onset: Onset, h: f64) -> Method {
+    pub fn of(model: &Model, onset: Onset) -> Method {
         match (model.settings.integrator, onset) {
             (Integrator::ImplicitEuler, _) | (Integrator::TrBdf2, Onset::Broken) => Method::Euler,
-            (Integrator::TrBdf2, _) if !holds_lengths(model, SPAN * h) => Method::Euler,
             (Integrator::TrBdf2, Onset::Unknown) => Method::Alexander,
             (Integrator::TrBdf2, Onset::Smooth) => Method::TrBdf2,
         }
@@ -84,17 +83,6 @@ impl Stage {
     pub fn length(&self) -> f64 {
         self.end - self.begin
     }
-}
-
-/// Whether the penalty of each inextensible thread holds its length as a whole against its inertia over `span`: else multipliers lag behind, and grow
-/// where nothing damps.
-fn holds_lengths(model: &Model, span: f64) -> bool {
-    model.rods.iter().filter(|(_, rod)| rod.stretch == crate::Stretch::Inextensible).all(|(_, rod)| {
-        let mass: f64 = rod.particles().map(|i| model.mass[i]).sum();
-        let give: f64 = rod.elements().map(|e| 1.0 / model.stretch_stiffness[e].z).sum();
-        // Lowest mode along a rod held at one end.
-        span * span * FRAC_PI_2 * FRAC_PI_2 >= mass * give
-    })
 }
 
 /// Sets up `target` and `target_frame`, and moves the state to the first iterate: for implicit Euler where its velocity carries it (loads left out:

@@ -2,8 +2,8 @@
 //!
 //! The substep minimizes inertia + elastic energy + contact (implicit Euler). Stretch is linearized with its multiplier: the geometric
 //! stiffness uses the tension that the last iteration predicted, not the one of the current strain, which makes the iteration that of
-//! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. For inextensible
-//! rods that multiplier also enters the residual (method of multipliers); its penalty is 100 EA.
+//! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. In
+//! inextensible rods that tension is an unknown of its own, eliminated in its element, whose stiffness is 1e5 EA (theory 7.1).
 
 use crate::math::exp;
 use crate::model::Model;
@@ -17,20 +17,8 @@ use crate::state::State;
 use core::ops::Range;
 use glam::DVec3;
 
-/// Elongation to which inextensible elements are held.
+/// Elongation to which an element of an inextensible thread agrees with its tension where a solve ends.
 pub(crate) const LENGTH_TOLERANCE: f64 = 5e-6;
-
-/// Elongation that is as good as none: held any longer, multipliers grow by 100 EA times it in each substep.
-pub(crate) const LENGTH_FLOOR: f64 = 1e-11;
-
-/// Turn \[rad\] of an iteration, and move in hundreds of radii, below which nothing moves at all.
-const STILL: f64 = 1e-7;
-
-/// Iterations in which lengths within the tolerance are looked after.
-const PATIENCE: u32 = 3;
-
-/// Elongation over that of the iteration before beyond which multipliers, which leave a hundredth where a thread can follow, do not bring a length back.
-const LASTING: f64 = 0.9;
 
 /// Least part of a step that is taken: a contact met on the way must be met, or the next step does not know of it.
 const SHORTEST: f64 = 0.3;
@@ -53,8 +41,6 @@ const SLACKEN: f64 = 0.2;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Outcome {
     pub converged: bool,
-    /// Nothing moves any more, and yet an inextensible thread is off its length.
-    pub infeasible: bool,
     pub finite: bool,
     pub iterations: u32,
     /// Largest rotation of the last iteration \[rad\] and largest move in thread radii.
@@ -68,13 +54,12 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     row::couple::begin(scratch);
-    let mut out = Outcome { converged: false, infeasible: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
+    let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly is as
     // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
-    let kept_before = keeps_lengths(model, &scratch.start);
-    let (mut before, mut moved_before, mut stretched_before) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
     while out.iterations < settings.newton_max && !scratch.exhausted() {
@@ -100,7 +85,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
                 break;
             }
             let part = (gained / (gained - left)).max(SHORTEST);
-            apply(model, state, scratch, -(1.0 - part) * taken * scale);
+            apply(model, state, scratch, -(1.0 - part) * taken * scale, false);
             taken *= part;
         }
         let blocks = core::mem::take(&mut scratch.rods);
@@ -115,14 +100,13 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         gained = work_ahead(model, state, scratch);
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
-        let slid = apply(model, state, scratch, scale);
+        let slid = apply(model, state, scratch, scale, true);
         row::shape::predict(scratch, scale);
         (out.turn, out.residual) = largest_move(model, scratch, scale);
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
             (waiting, exact) = (false, true);
         }
         out.residual = max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
-        let stretched = length_error(model, &state.position);
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
@@ -131,20 +115,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
         (before, moved_before) = (out.turn, out.residual);
         let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
-        // What a thread that had its length is off by where nothing moves any more must not last; while it moves there are elongations of second order. With
-        // contacts an iterate may count as at rest that is still on its way.
-        let still = out.turn < STILL && out.residual < 100.0 * STILL;
-        let watched = kept_before && still && out.iterations <= PATIENCE.min(settings.newton_max);
-        let lasts = stretched > LASTING * stretched_before;
-        if rests && lasts && (still || scratch.rows.is_empty()) && stretched > if watched { LENGTH_FLOOR } else { LENGTH_TOLERANCE } {
-            out.infeasible = true;
-            break;
-        }
-        let again = watched && !lasts && out.iterations < PATIENCE.min(settings.newton_max);
-        let owed = stretched > if again { LENGTH_FLOOR } else { LENGTH_TOLERANCE };
-        stretched_before = stretched;
         if rests
-            && !owed
+            && length_error(model, state, scratch) <= LENGTH_TOLERANCE
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
             && row::shape::settled(model, state, scratch, out.iterations)
@@ -182,37 +154,43 @@ fn work(scratch: &Scratch) -> f64 {
 }
 
 /// Linear change of an element's strain along the last step.
-fn strain_change(state: &State, step: &[DVec3], e: usize) -> DVec3 {
-    let d = state.position[e + 1] - state.position[e];
-    state.orientation[e].conjugate() * (step[2 * e + 2] - step[2 * e] + d.cross(step[2 * e + 1]))
+fn strain_change(model: &Model, state: &State, step: &[DVec3], e: usize) -> DVec3 {
+    let (d, apart) = (state.position[e + 1] - state.position[e], step[2 * e + 2] - step[2 * e]);
+    let change = state.orientation[e].conjugate() * (apart + d.cross(step[2 * e + 1]));
+    if model.inextensible[e] { change.truncate().extend(apart.dot(d) / d.length()) } else { change }
 }
 
 /// Work along the last step of what `excess` says that the stretch and shear forces of each element are too large by.
-fn work_of_excess(state: &State, scratch: &Scratch, excess: impl Fn(usize, DVec3) -> DVec3) -> f64 {
+fn work_of_excess(model: &Model, state: &State, scratch: &Scratch, excess: impl Fn(usize, DVec3) -> DVec3) -> f64 {
     // What slips off a reel builds up no force.
     let slips = |e: &usize| scratch.brakes.iter().any(|b| b.element == *e && b.slips);
     let elements = scratch.rods.iter().flat_map(|(rod, _)| rod.start..rod.end - 1).filter(|e| !slips(e));
     let on = |e: usize| {
-        let change = strain_change(state, &scratch.step, e);
+        let change = strain_change(model, state, &scratch.step, e);
         excess(e, change).dot(change)
     };
     elements.map(on).sum()
 }
 
+/// Stiffness of an element along its directors as it was last assembled.
+fn stiffness(model: &Model, scratch: &Scratch, e: usize) -> DVec3 {
+    model.stretch_stiffness[e].truncate().extend(scratch.axial(model, e).0)
+}
+
 /// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds up.
 fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
-    work(scratch) - work_of_excess(state, scratch, |e, change| model.stretch_stiffness[e] * change)
+    work(scratch) - work_of_excess(model, state, scratch, |e, change| stiffness(model, scratch, e) * change)
 }
 
 /// Work of the forces at the iterate along the last step, with the stretch and shear forces that the step predicted: those of the strain itself hold an
 /// error of second order in the turn, which the next step takes away and which outweighs all else.
 fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let error = |e: usize, _| {
-        let force = element_strain(model, state, e) * model.stretch_stiffness[e];
-        let tension = if model.inextensible[e] { 0.0 } else { scratch.tension[e] - model.offset[e] };
-        force - scratch.shear[e].extend(tension)
+        let (axial, at_rest) = scratch.axial(model, e);
+        let force = element_strain(model, state, e) * model.stretch_stiffness[e].truncate().extend(axial);
+        force - scratch.shear[e].extend(scratch.tension[e] - at_rest)
     };
-    work(scratch) + work_of_excess(state, scratch, error) - row::shape::work_unforeseen(scratch)
+    work(scratch) + work_of_excess(model, state, scratch, error) - row::shape::work_unforeseen(scratch)
 }
 
 /// Assembles and factors. False when a pivot is not positive.
@@ -274,13 +252,8 @@ pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h:
 }
 
 fn unbalanced_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &RodModel, held: Range<usize>) {
-    for e in held.start.max(rod.first as usize + 1) - 1..held.end.min(rod.elements().end) {
-        scratch.tension[e] = state.tension[e];
-        if model.inextensible[e] {
-            // The multiplier alone is the tension of an inextensible element; its penalty is taken off again.
-            scratch.tension[e] -= element_strain(model, state, e).z * model.stretch_stiffness[e].z;
-        }
-    }
+    let elements = held.start.max(rod.first as usize + 1) - 1..held.end.min(rod.elements().end);
+    scratch.tension[elements.clone()].copy_from_slice(&state.tension[elements]);
     assemble_blocks(model, state, scratch, h, &rod.particles(), held);
 }
 
@@ -329,17 +302,27 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
     out.abs() > TRUSTED * kept
 }
 
-/// Takes a part of the step; the largest move of a pushed shape \[m\].
-fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) -> f64 {
+/// Takes a part of the step, `anew` or back on the last one; the largest move of a pushed shape \[m\].
+fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64, anew: bool) -> f64 {
     for r in 0..scratch.rods.len() {
         let rod = scratch.rods[r].0.clone();
         for e in rod.start..rod.end - 1 {
             // Predicted force: strain now plus its linear change.
             let (q, d) = (state.orientation[e], state.position[e + 1] - state.position[e]);
-            let strain = q.conjugate() * d + strain_change(state, &scratch.step, e) * scale - DVec3::new(0.0, 0.0, model.rest_length[e]);
+            let change = strain_change(model, state, &scratch.step, e);
+            let strain = q.conjugate() * d + change * scale - DVec3::new(0.0, 0.0, model.rest_length[e]);
             let f = strain * model.stretch_stiffness[e];
-            scratch.tension[e] = f.z + if model.inextensible[e] { scratch.tension[e] } else { model.offset[e] };
             scratch.shear[e] = f.truncate();
+            if !model.inextensible[e] {
+                scratch.tension[e] = f.z;
+                continue;
+            }
+            // The tension is an unknown of its own, of which as much is taken as of the others.
+            if anew {
+                let (axial, at_rest) = scratch.axial(model, e);
+                scratch.tension_change[e] = (d.length() - model.rest_length[e] + change.z) * axial + at_rest - scratch.tension[e];
+            }
+            scratch.tension[e] += scratch.tension_change[e] * scale;
         }
         for i in rod.clone() {
             state.position[i] += scratch.step[2 * i] * scale;
@@ -356,24 +339,17 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64) ->
     rows.sliders.apply(state, &rows.border, scale)
 }
 
-/// Whether every element whose length is a constraint keeps it.
-pub(crate) fn keeps_lengths(model: &Model, positions: &[DVec3]) -> bool {
-    length_error(model, positions) < LENGTH_TOLERANCE
-}
-
-/// Largest |elongation| of an element whose length is a constraint: a second-order error of the turn that Newton just made.
-fn length_error(model: &Model, x: &[DVec3]) -> f64 {
-    // Least and largest square of length over rest length.
-    let (mut least, mut most) = (1.0, 1.0);
+/// Largest elongation by which an element of an inextensible thread is off what its tension makes it: a second-order error of the turn that Newton just made.
+fn length_error(model: &Model, state: &State, scratch: &Scratch) -> f64 {
+    let mut worst = 0.0;
     for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {
-        for e in rod.elements().filter(|e| model.inextensible[*e]) {
-            let l = model.rest_length[e];
-            let ratio = (x[e + 1] - x[e]).length_squared() / (l * l);
-            least = if ratio >= least { least } else { ratio };
-            most = max_or_nan(most, ratio);
+        for e in rod.elements() {
+            let (axial, at_rest) = scratch.axial(model, e);
+            let c = (state.position[e + 1] - state.position[e]).length() - model.rest_length[e];
+            worst = max_or_nan(worst, (c - (scratch.tension[e] - at_rest) / axial).abs() / model.rest_length[e]);
         }
     }
-    (1.0 - f64::sqrt(least)).max(f64::sqrt(most) - 1.0)
+    worst
 }
 
 fn largest_move(model: &Model, scratch: &Scratch, scale: f64) -> (f64, f64) {

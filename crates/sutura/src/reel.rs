@@ -260,7 +260,6 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
         rest_half,
         stretch_stiffness,
         inextensible,
-        offset,
         bend_stiffness,
         bend_damping,
         ..
@@ -268,7 +267,7 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! again {
         ($($array:ident),*) => {$( let v = $array[e].clone(); $array.insert(e + 1, v); )*};
     }
-    again!(mass, rod_of, rest_length, factors, section, inertia, joint_length, stretch_stiffness, inextensible, offset, bend_stiffness, bend_damping);
+    again!(mass, rod_of, rest_length, factors, section, inertia, joint_length, stretch_stiffness, inextensible, bend_stiffness, bend_damping);
     rest_half.insert(e + 1, glam::DQuat::IDENTITY);
     shift_model(rods, rod, e, 1);
     for (_, weld) in model.welds.iter_mut() {
@@ -294,7 +293,6 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
         rest_half,
         stretch_stiffness,
         inextensible,
-        offset,
         bend_stiffness,
         bend_damping,
         ..
@@ -302,21 +300,7 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! without {
         ($($array:ident),*) => {$( $array.remove(e + 1); )*};
     }
-    without!(
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        rest_half,
-        stretch_stiffness,
-        inextensible,
-        offset,
-        bend_stiffness,
-        bend_damping
-    );
+    without!(mass, rod_of, rest_length, factors, section, inertia, joint_length, rest_half, stretch_stiffness, inextensible, bend_stiffness, bend_damping);
     shift_model(rods, rod, e, -1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {

@@ -105,8 +105,8 @@ pub enum IncidentKind {
         /// Largest move in the last iteration over the thread's radius.
         residual: f64,
     },
-    /// No motion keeps an inextensible thread at its length, as where its ends are driven apart, or none was found: for the rest of the step it stretched as
-    /// its material does.
+    /// To keep an inextensible thread at its length would take more force than any thread bears, as where its ends are driven apart, or no way was
+    /// found: for the rest of the step it stretched as its material does.
     LengthNotKept {
         /// The thread.
         rod: Handle<Rod>,
@@ -146,7 +146,7 @@ impl core::fmt::Display for IncidentKind {
             IncidentKind::Held { reason, .. } => write!(f, "no acceptable motion of a thread was found ({reason}); it stayed where it was, the rest went on"),
             IncidentKind::NotConverged { residual } => write!(f, "accepted without convergence: last move {residual:.2e} radii"),
             IncidentKind::LengthNotKept { elongation, .. } => {
-                write!(f, "no motion keeps an inextensible thread at its length (off by {:.3} %); it stretched as its material does", 100.0 * elongation)
+                write!(f, "an inextensible thread did not keep its length (off by {:.3} %): it stretched as its material does", 100.0 * elongation)
             }
             IncidentKind::Teleport { distance } => write!(f, "a driven thing jumped {distance:.3e} m in one step"),
             IncidentKind::Overlap(o) => {

@@ -104,6 +104,11 @@ pub(crate) struct Scratch {
     pub step: Vec<DVec3>,
     /// Predicted tension after the current iteration, for geometric stiffness.
     pub tension: Vec<f64>,
+    /// What the last step, in full, changes it by in inextensible threads.
+    pub tension_change: Vec<f64>,
+    /// Axial force at its rest length \[N\] of each element that stretches as its material does although its thread is inextensible, for the rest of
+    /// a step.
+    pub stretches: Vec<Option<f64>>,
     /// Predicted shear force along the first two directors, likewise.
     pub shear: Vec<DVec2>,
     /// Moment of the joint before each element on the element before it, in world axes.
@@ -128,7 +133,15 @@ impl Scratch {
     pub fn exhausted(&self) -> bool {
         self.work > crate::params::SUBSTEP_WORK
     }
-    /// Makes room for the model's arrays.
+    /// Axial stiffness of an element \[N/m\], and its axial force at its rest length \[N\].
+    #[inline(always)]
+    pub fn axial(&self, model: &crate::model::Model, e: usize) -> (f64, f64) {
+        match self.stretches[e] {
+            None => (model.stretch_stiffness[e].z, 0.0),
+            Some(force) => (model.section[e].ea / model.rest_length[e], force),
+        }
+    }
+    /// Makes room for the model's arrays. Inextensible threads keep their length again.
     pub fn fit(&mut self, model: &crate::model::Model) {
         let n = model.mass.len();
         self.target.resize(n, DVec3::ZERO);
@@ -146,6 +159,9 @@ impl Scratch {
         self.rhs.resize(2 * n, DVec3::ZERO);
         self.step.resize(2 * n, DVec3::ZERO);
         self.tension.resize(n, 0.0);
+        self.tension_change.resize(n, 0.0);
+        self.stretches.clear();
+        self.stretches.resize(n, None);
         self.shear.resize(n, DVec2::ZERO);
         self.moment.resize(n, DVec3::ZERO);
         self.radius.clear();

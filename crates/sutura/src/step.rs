@@ -42,7 +42,6 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     state.time = interval.start;
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
-            take_up(model, state, report);
             scratch.fit(model);
             state.interrupt(Onset::Unknown);
             // Who looks from state to state must not lose sight of the motion to come.
@@ -51,7 +50,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
         scratch.work = 0.0;
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
-    take_up(model, state, report);
+    tell_lengths(model, state, report);
     // Where nothing acceptable was found, what is driven stays with the rest.
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
@@ -62,7 +61,16 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     state.time = interval.start + interval.length;
 }
 
-/// Halvings after which threads that do not stretch are let stretch, if there is still no acceptable substep.
+/// Tension over E A that no inextensible thread keeps its length under: no thread bears as much.
+const UNBEARABLE: f64 = 0.5;
+
+/// Tension over E A from which an inextensible thread may be why a substep is not acceptable.
+const TAUT: f64 = 1e-3;
+
+/// Most that a thread keeps of its tension, over E A, where it begins to stretch.
+const KEPT_TENSION: f64 = 0.05;
+
+/// Halvings after which taut inextensible threads stretch, if there is still no acceptable substep.
 const GIVE_WAY: u32 = 4;
 
 /// Accepted substeps of one length before twice the length is tried again.
@@ -92,7 +100,7 @@ fn advance(
         outside_forces(model, state, scratch);
     }
     // Length that comes in has no past to go by.
-    let mut method = if reels { Method::Euler } else { Method::of(model, state.onset, h) };
+    let mut method = if reels { Method::Euler } else { Method::of(model, state.onset) };
     let mut attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
     if attempt.touches_anew {
         // What stops or jumps has no second derivative to go by, and would bounce.
@@ -127,21 +135,11 @@ fn advance(
         }
         Err(reason) => {
             report.rejected += 1;
-            // Shorter substeps are of no help to a thread that cannot keep its length, or is off it already.
             let last = depth >= model.settings.halvings || scratch.exhausted();
-            let from = &scratch.saved[depth as usize];
-            let off = !newton::keeps_lengths(model, &from.position) && !newton::keeps_lengths(model, &state.position);
-            let least = if last || depth >= GIVE_WAY {
-                Some(0.0)
-            } else if reason == Rejection::LengthNotKept {
-                Some(newton::LENGTH_FLOOR)
-            } else {
-                off.then_some(newton::LENGTH_TOLERANCE)
-            };
-            let gives_way = least.is_some_and(|least| give_way(model, state, from, least));
             restore(state, scratch, depth);
             reel::follow(model, state);
-            if gives_way {
+            let taut = if last || depth >= GIVE_WAY { TAUT } else { UNBEARABLE };
+            if let_stretch(model, state, scratch, taut) {
                 return advance(model, state, scratch, interval, t, h, depth, report);
             }
             (state.last_h, state.calm) = (0.5 * h, 0);
@@ -185,44 +183,46 @@ fn hold_refused(model: &Model, scratch: &mut Scratch, t: f64) -> Option<[u32; 2]
     (scratch.held.len() > before && scratch.held.len() < scratch.rods.len()).then_some(rods)
 }
 
-/// Inextensible threads that are off their length by the `least` elongation or more in a state that was tried stretch as their material does, as a thread does
-/// in truth, from the last good state to the end of the step. Whether there are any.
-fn give_way(model: &mut Model, tried: &State, from: &State, least: f64) -> bool {
-    let mut any = false;
-    for slot in 0..model.rods.len() as u32 {
-        let Some(rod) = model.rods.at(slot).filter(|r| model.inextensible[r.first as usize]) else { continue };
-        let elongation = most_elongated(model, rod, tried);
-        if elongation.abs() >= least {
-            // A trial from a length that is off may end anywhere.
-            let off = [from, tried].map(|s| longer_by(model, rod, s)).into_iter().find(|off| off.abs() > newton::LENGTH_TOLERANCE);
-            model.give_way(slot, from, off.is_some_and(|off| off < 0.0));
-            any = true;
+/// Tension over E A of the element of a rod that was last found to be pulled or pressed most.
+fn most_pulled(model: &Model, scratch: &Scratch, rod: &RodModel) -> f64 {
+    rod.elements().map(|e| scratch.tension[e] / model.section[e].ea).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
+}
+
+/// Inextensible threads that keep their length.
+fn keeping<'a>(model: &'a Model, scratch: &'a Scratch) -> impl Iterator<Item = &'a RodModel> {
+    model.rods.iter().map(|(_, rod)| rod).filter(|r| r.stretch == Stretch::Inextensible && scratch.stretches[r.first as usize].is_none())
+}
+
+/// Greatest tension over E A of inextensible threads that keep their length.
+fn tautest(model: &Model, scratch: &Scratch) -> f64 {
+    keeping(model, scratch).map(|rod| most_pulled(model, scratch, rod).abs()).fold(0.0, f64::max)
+}
+
+/// Inextensible threads that the last attempt found as `taut`, over E A, or more stretch as their material does from here to the end of the step.
+/// Whether there are any.
+fn let_stretch(model: &Model, state: &State, scratch: &mut Scratch, taut: f64) -> bool {
+    let found: Vec<_> =
+        keeping(model, scratch).map(|rod| (rod.elements(), most_pulled(model, scratch, rod))).filter(|(_, pulled)| pulled.abs() >= taut).collect();
+    for (elements, pulled) in &found {
+        for e in elements.clone() {
+            let ea = model.section[e].ea;
+            let before = state.tension[e] - ea * crate::rod::element_strain(model, state, e).z / model.rest_length[e];
+            // What is pressed along itself has no tension to begin with, and the other way round.
+            let (least, most) = if *pulled > 0.0 { (0.0, KEPT_TENSION * ea) } else { (-KEPT_TENSION * ea, 0.0) };
+            scratch.stretches[e] = Some(before.clamp(least, most));
         }
     }
-    any
+    !found.is_empty()
 }
 
-/// Elongation of a rod as a whole.
-fn longer_by(model: &Model, rod: &RodModel, state: &State) -> f64 {
-    let (now, rest) = rod.elements().fold((0.0, 0.0), |(a, b), e| (a + (state.position[e + 1] - state.position[e]).length(), b + model.rest_length[e]));
-    now / rest - 1.0
-}
-
-/// Elongation of the element that is off its length most.
-fn most_elongated(model: &Model, rod: &RodModel, state: &State) -> f64 {
-    let elongation = |e: usize| (state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0;
-    rod.elements().map(elongation).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
-}
-
-/// From the next step on those that gave way are to keep their length again. What they are off it by is told.
-fn take_up(model: &mut Model, state: &State, report: &mut StepReport) {
-    for slot in 0..model.rods.len() as u32 {
-        let Some(rod) = model.rods.at(slot).filter(|r| r.stretch == Stretch::Inextensible && !model.inextensible[r.first as usize]) else { continue };
-        let elongation = most_elongated(model, rod, state);
-        if elongation.abs() > newton::LENGTH_TOLERANCE {
-            report.incidents.push(Incident { time: state.time, kind: IncidentKind::LengthNotKept { rod: model.rods.handle(slot), elongation } });
+/// Tells of inextensible threads whose tension was more than one can bear that keeps its length.
+fn tell_lengths(model: &Model, state: &State, report: &mut StepReport) {
+    for (slot, rod) in model.rods.iter().filter(|(_, r)| r.stretch == Stretch::Inextensible) {
+        let elongation = |e: usize| (state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0;
+        let most = rod.elements().map(elongation).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        if most.abs() > 2.0 * newton::LENGTH_TOLERANCE {
+            report.incidents.push(Incident { time: state.time, kind: IncidentKind::LengthNotKept { rod: model.rods.handle(slot), elongation: most } });
         }
-        model.keep_length(slot);
     }
 }
 
@@ -278,7 +278,7 @@ fn solve(
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
             Err(Rejection::NotFinite)
-        } else if outcome.infeasible || !outcome.converged && depth == model.settings.halvings && !newton::keeps_lengths(model, &state.position) {
+        } else if (outcome.converged || depth == model.settings.halvings) && tautest(model, scratch) >= UNBEARABLE {
             Err(Rejection::LengthNotKept)
         } else if !outcome.converged && scratch.exhausted() {
             Err(Rejection::TooMuchWork)
@@ -519,7 +519,7 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, stage: &Stage
     for (rod, _) in &scratch.rods {
         for e in rod.start..rod.end - 1 {
             let strain = crate::rod::element_strain(model, state, e);
-            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z + model.offset[e] };
+            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
         }
     }
     yield_plastic(model, state);

@@ -128,7 +128,6 @@ impl World {
             model.rest_length.push(after);
             state.rest_length.push(after);
             model.inextensible.push(spec.stretch == Stretch::Inextensible);
-            model.offset.push(0.0);
             model.factors.push(low.factors[e.min(n - 1)]);
             model.section.push(section);
             model.stretch_stiffness.push(DVec3::splat(section.ea));
@@ -175,7 +174,7 @@ impl World {
     ///
     /// Where the thread is and how fast it moves stays, and so does its shape at rest with the plastic set that it has (also where the new material takes
     /// none) and the hardening, which is counted in strains at yield. Forces follow: tensions of an elastic thread and all moments are those of
-    /// the present strains from here on, momentum is that of the present velocities. The multipliers of an inextensible thread, contact forces and
+    /// the present strains from here on, momentum is that of the present velocities. The tensions of an inextensible thread, contact forces and
     /// the forces of grips are those of the last substep until the next one. What is bent beyond a new yield yields in the next substep.
     /// The integrator starts anew, as after any other edit.
     pub fn set_material(&mut self, rod: Handle<Rod>, material: &Material) -> Result<(), Error> {
@@ -236,7 +235,6 @@ impl World {
             model.inertia,
             model.rest_length,
             model.inextensible,
-            model.offset,
             model.stretch_stiffness,
             model.joint_length,
             model.bend_stiffness,

@@ -11,7 +11,7 @@ pub mod weld;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
-use crate::state::{LoadState, State};
+use crate::state::LoadState;
 use glam::{DQuat, DVec3};
 use grip::LoadKind;
 use material::{Material, SectionStiffness};
@@ -20,9 +20,9 @@ use section::Factors;
 use shape::{Geometry, ShapeMotion};
 use weld::WeldModel;
 
-/// Penalty of the multiplier of an inextensible element over its physical stiffness: high enough that one Newton iteration leaves a
-/// hundredth of the physical stretch, low enough to cost no digits.
-const INEXTENSIBLE_PENALTY: f64 = 100.0;
+/// Axial stiffness of an inextensible element over that of its material: under half of E A, more than any thread bears, it is longer by
+/// 5e-6. Stiffer, tension would lose digits to the rounding of positions.
+const INEXTENSIBLE: f64 = 1e5;
 
 /// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last element entry
 /// of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
@@ -56,12 +56,10 @@ pub struct Model {
     pub(crate) joint_length: Vec<f64>,
     /// Square root of the rest rotation of the joint between `e - 1` and `e`.
     pub(crate) rest_half: Vec<DQuat>,
-    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; for inextensible rods that of the multiplier's penalty) \[N/m\].
+    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; of inextensible rods along the line between its ends) \[N/m\].
     pub(crate) stretch_stiffness: Vec<DVec3>,
-    /// Whether the length of each element is a constraint: where the thread is inextensible, unless it gives way for the rest of a step.
+    /// Whether each element is one of an inextensible thread.
     pub(crate) inextensible: Vec<bool>,
-    /// Axial force of each element at its rest length \[N\]: zero, unless an inextensible thread gives way.
-    pub(crate) offset: Vec<f64>,
     /// Stiffness of each joint in bending about d1, d2 and twist about d3 \[N m/rad\].
     pub(crate) bend_stiffness: Vec<DVec3>,
     /// Relaxation time of Kelvin-Voigt damping of each joint \[s\].
@@ -126,25 +124,9 @@ impl Model {
     /// Stiffness of an element from its section and length.
     pub(crate) fn refresh_element(&mut self, e: usize) {
         if self.is_element(e) {
-            let penalty = if self.inextensible[e] { INEXTENSIBLE_PENALTY } else { 1.0 };
+            let stiffer = if self.inextensible[e] { INEXTENSIBLE } else { 1.0 };
             let section = &self.section[e];
-            self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, penalty * section.ea) / self.rest_length[e];
-        }
-    }
-    /// Lets a rod stretch from a state on, from which its tension grows by E A times the strain; what is to be shorter has no tension to begin with.
-    pub(crate) fn give_way(&mut self, slot: u32, from: &State, shorter: bool) {
-        for e in self.rods.at(slot).map_or(0..0, RodModel::elements) {
-            self.inextensible[e] = false;
-            self.refresh_element(e);
-            let tension = if shorter { from.tension[e].min(0.0) } else { from.tension[e] };
-            self.offset[e] = tension - crate::rod::element_strain(self, from, e).z * self.stretch_stiffness[e].z;
-        }
-    }
-    /// Makes the length of a rod a constraint again.
-    pub(crate) fn keep_length(&mut self, slot: u32) {
-        for e in self.rods.at(slot).map_or(0..0, RodModel::elements) {
-            (self.inextensible[e], self.offset[e]) = (true, 0.0);
-            self.refresh_element(e);
+            self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, stiffer * section.ea) / self.rest_length[e];
         }
     }
     /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of the next.

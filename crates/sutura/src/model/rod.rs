@@ -71,8 +71,8 @@ pub struct Closure {
 pub enum Stretch {
     /// By T / (E A).
     Elastic,
-    /// Not at all: lengths are constraints, held to the solver's tolerance. Where no motion keeps them it stretches as its material does, and the report
-    /// says so ([`IncidentKind::LengthNotKept`](crate::IncidentKind::LengthNotKept)).
+    /// Not at all: lengths are held to 1e-5. Where they would take half of E A to hold, as between ends that are driven apart, it stretches as its
+    /// material does, and the report says so ([`IncidentKind::LengthNotKept`](crate::IncidentKind::LengthNotKept)).
     Inextensible,
 }
 

@@ -41,7 +41,16 @@ fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Sc
     let last = rod.end - 1;
     let half = (last - rod.start) / 2;
     let middle = rod.start + half;
-    let at = At::<FLAT> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: hessian == Hessian::Exact, last };
+    let at = At::<FLAT> {
+        model,
+        state,
+        inv_h2: 1.0 / (h * h),
+        inv_h: 1.0 / h,
+        exact: hessian == Hessian::Exact,
+        keeps_length: model.inextensible[rod.start],
+        given: false,
+        last,
+    };
     // The first half in the low lane, the second in the high one.
     let mut carry = Carry::none();
     if half > 0 {
@@ -57,10 +66,10 @@ fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Sc
     at.last_block(scratch, &carry);
 }
 
-/// The residual and the Hessian without the clamps of the blocks `held` of a rod.
+/// The residual and the Hessian without the clamps of the blocks `held` of a rod, with the tensions that are in `scratch`.
 pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &Range<usize>, held: Range<usize>) {
     let last = rod.end - 1;
-    let at = At::<true> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, last };
+    let at = At::<true> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, keeps_length: model.inextensible[rod.start], given: true, last };
     let mut carry = if held.start > rod.start { at.carry(scratch, held.start - 1) } else { Carry::none() };
     for e in held {
         if e == last {
@@ -128,6 +137,10 @@ struct At<'a, const FLAT: bool> {
     inv_h2: f64,
     inv_h: f64,
     exact: bool,
+    /// Whether the rod is inextensible.
+    keeps_length: bool,
+    /// Whether the axial force is the tension that is given instead of that of the strain.
+    given: bool,
     /// Last particle of the rod.
     last: usize,
 }
@@ -193,13 +206,20 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let l = lanes(model.rest_length[low], model.rest_length[high]);
         // Shear stiffness is the same in both directions: R K R^T = a I + b t t^T.
         let (k0, k1) = (model.stretch_stiffness[low], model.stretch_stiffness[high]);
-        let (a, c) = (lanes(k0.x, k1.x), lanes(k0.z, k1.z));
-        let b = c - a;
-        let along = t.dot(&d);
+        let a = lanes(k0.x, k1.x);
         let (t0, t1) = (scratch.tension[low], scratch.tension[high]);
-        let multiplier = |e: usize, t: f64| if model.inextensible[e] { t } else { model.offset[e] };
-        let pull = c * (along - l) + lanes(multiplier(low, t0), multiplier(high, t1));
-        let force = d.plus(&t, -along).scaled(a).plus(&t, pull);
+        let ((c0, p0), (c1, p1)) = (scratch.axial(model, low), scratch.axial(model, high));
+        let c = lanes(c0, c1);
+        let along = t.dot(&d);
+        // The length of an inextensible element is that between its ends, which shear does not change.
+        let (line, stretched, b) = if self.keeps_length {
+            let length = d.dot(&d).sqrt();
+            (d.scaled(f64x2::splat(1.0) / length), length, -a)
+        } else {
+            (t, along, c - a)
+        };
+        let pull = if self.given { lanes(t0, t1) } else { c * (stretched - l) + lanes(p0, p1) };
+        let force = d.plus(&t, -along).scaled(a).plus(&line, pull);
         // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
         // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
         let g = if self.exact { lanes(t0, t1) } else { lanes(t0.max(0.0), t1.max(0.0)) } / l;
@@ -218,7 +238,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
             let shear = r1.scaled(lanes(s0.x, s1.x) * half).plus(&r2, lanes(s0.y, s1.y) * half);
             kt = kt.less_product(&shear, &t);
         }
-        Element { axis: t, force, torque: d.cross(&force), kx: Sym2::scalar(a + g).square(&t, b - g), kd, kt }
+        let kx = if self.keeps_length { Sym2::scalar(a + g).square(&t, b).square(&line, c - g) } else { Sym2::scalar(a + g).square(&t, b - g) };
+        Element { axis: t, force, torque: d.cross(&force), kx, kd, kt }
     }
 
     /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the latter with the frame
@@ -295,7 +316,7 @@ mod tests {
     use super::*;
     use crate::math::exp;
     use crate::rod::element_strain;
-    use crate::{Material, RodSpec, Section, World};
+    use crate::{Material, RodSpec, Section, Stretch, World};
 
     /// Numbers in [-0.5, 0.5) from a seed.
     fn noise(seed: &mut u64) -> f64 {
@@ -310,16 +331,18 @@ mod tests {
     #[test]
     fn the_exact_hessian_is_the_derivative_of_the_residual() {
         for section in [Section::Round, Section::Rectangle([2e-3, 5e-3])] {
-            compare_derivatives(section);
+            for stretch in [Stretch::Elastic, Stretch::Inextensible] {
+                compare_derivatives(section, stretch);
+            }
         }
     }
 
-    fn compare_derivatives(section: Section) {
+    fn compare_derivatives(section: Section, stretch: Stretch) {
         // A bent, twisted, stretched rod with soft section, so that every term matters.
         let mut seed = 7;
         let n = 5;
         let mut world = World::default();
-        let spec = RodSpec { section, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0)) };
+        let spec = RodSpec { section, stretch, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0)) };
         world.insert_rod(&spec).unwrap();
         let (model, mut state) = world.into_parts();
         for i in 0..=n {

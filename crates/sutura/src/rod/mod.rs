@@ -13,11 +13,12 @@ use crate::state::{GripState, State};
 use crate::view::Energy;
 use glam::DVec3;
 
-/// Stretch and shear of element `e` along its directors \[m\].
+/// Stretch and shear of element `e` along its directors \[m\]. The stretch of an inextensible one is that of the line between its ends.
 #[inline]
 pub(crate) fn element_strain(model: &Model, state: &State, e: usize) -> DVec3 {
     let d = state.position[e + 1] - state.position[e];
-    state.orientation[e].conjugate() * d - DVec3::new(0.0, 0.0, model.rest_length[e])
+    let c = state.orientation[e].conjugate() * d;
+    c.truncate().extend(if model.inextensible[e] { d.length() } else { c.z } - model.rest_length[e])
 }
 
 /// Force carried by element `e` along its directors \[N\].

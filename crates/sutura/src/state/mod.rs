@@ -38,7 +38,7 @@ pub struct State {
     pub(crate) acceleration: Vec<DVec3>,
     pub(crate) angular_acceleration: Vec<DVec3>,
     pub(crate) onset: Onset,
-    /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the multiplier of inextensible elements.
+    /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the first guess of inextensible elements.
     pub(crate) tension: Vec<f64>,
     /// Plastic bend and twist of the joint before each element \[rad\], part of the rest strain.
     pub(crate) plastic: Vec<DVec3>,

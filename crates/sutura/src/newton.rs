@@ -311,7 +311,7 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
                 let change = state.orientation[e].conjugate() * (step[2 * e + 2] - step[2 * e]);
                 out += scratch.tension[e] / model.rest_length[e] * change.truncate().length_squared();
             }
-            kept += model.mass[e] / (h * h) * step[2 * e].length_squared();
+            kept += scratch.heavier[0] * model.mass[e] / (h * h) * step[2 * e].length_squared();
             if e > rod.start {
                 let before = step[2 * e - 1];
                 out += before.dot(scratch.moment[e].cross(turn));
@@ -356,7 +356,7 @@ pub(crate) fn keeps_lengths(model: &Model, positions: &[DVec3]) -> bool {
 }
 
 /// Largest |elongation| of an element whose length is a constraint: a second-order error of the turn that Newton just made.
-fn length_error(model: &Model, x: &[DVec3]) -> f64 {
+pub(crate) fn length_error(model: &Model, x: &[DVec3]) -> f64 {
     // Least and largest square of length over rest length.
     let (mut least, mut most) = (1.0, 1.0);
     for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {

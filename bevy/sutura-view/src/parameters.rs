@@ -199,6 +199,8 @@ fn settings_ui(ui: &mut Ui, s: &mut Settings, paper: &mut PaperSettings) {
         ui.add(decades(&mut s.substep, 1e-5..=0.05, "s", true).text("substep"));
         ui.add(slider(&mut s.linear_damping, 0.0..=0.999).text("linear damping [part/s]"));
         ui.add(slider(&mut s.angular_damping, 0.0..=0.999).text("angular damping [part/s]"));
+        ui.add(slider(&mut s.linear_drag, 0.0..=1000.0).text("linear drag [1/s]"));
+        ui.add(slider(&mut s.angular_drag, 0.0..=1000.0).text("angular drag [1/s]"));
         ui.horizontal(|ui| {
             ui.label("solver");
             let direct = s.solver == Solver::Direct;

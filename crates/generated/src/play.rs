@@ -234,7 +234,7 @@ pub struct Seen {
     pub incidents: BTreeMap<&'static str, u64>,
     /// What must not be: a number that is not finite, work without bound, a passage. The first, in words.
     pub fault: Option<String>,
-    /// Of a passive scene: the most that its energy grew in a substep, over what was turned over until then.
+    /// Of a passive scene: the most that its energy grew in a step, over what was turned over until then.
     pub growth: f64,
     /// Time of that \[s\].
     pub growth_time: f64,
@@ -266,7 +266,7 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
     };
     // Threads of a scene whose energy is looked at keep their numbers.
     let whole = player.rods.iter().all(Option::is_some);
-    let mut energies = (whole && scene.is_passive()).then(|| Turnover::new(scene, player.world.view()));
+    let mut energies = (whole && scene.is_passive()).then(|| Turnover::new(scene, &player.world));
     // Ends that were welded lie in each other when the weld is gone, and part.
     let audited = audited && scene.welds.iter().all(|w| w.until == u32::MAX);
     let mut audit = Audit::new();
@@ -275,13 +275,13 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
     }
     while !player.is_over() && seen.fault.is_none() {
         let report = player.step(&mut |view| {
-            if let Some(e) = &mut energies {
-                e.observe(view);
-            }
             if audited {
                 audit.observe(view);
             }
         });
+        if let Some(e) = &mut energies {
+            e.observe(&player.world, report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })));
+        }
         seen.frames += 1;
         seen.substeps += u64::from(report.substeps);
         seen.rejected += u64::from(report.rejected);
@@ -352,17 +352,19 @@ fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
     None
 }
 
-/// Energy of a passive scene from substep to substep.
+/// Energy of a passive scene from step to step.
 struct Turnover<'a> {
     scene: &'a Scene,
     start: f64,
     last: f64,
-    /// What the constraints of length left open at the last state.
+    /// What constraints of length and contacts left open at the last state.
     open: f64,
     /// Most that any kind of energy was so far: what a difference is measured by \[J\].
     most: f64,
     growth: f64,
     time: f64,
+    /// Whether a length was not kept in the last step.
+    off: bool,
 }
 
 /// Where nothing moves energy is the rounding of lengths and angles: this part of EI / L counts as turned over.
@@ -372,29 +374,37 @@ const NOTHING: f64 = 1e-9;
 const LENGTH_TOLERANCE: f64 = 5e-6;
 
 impl<'a> Turnover<'a> {
-    fn new(scene: &'a Scene, view: View<'_>) -> Self {
+    fn new(scene: &'a Scene, world: &World) -> Self {
+        let view = world.view();
         let (own, potential) = energy(scene, view);
         let bending: f64 = view.rods().map(|r| r.bending_stiffness(0).min_element() / r.rest_length()).sum();
-        let open = open_work(scene, view);
-        Turnover { scene, start: potential, last: own + potential, open, most: own.max(NOTHING * bending), growth: 0.0, time: 0.0 }
+        let open = open_work(scene, world);
+        Turnover { scene, start: potential, last: own + potential, open, most: own.max(NOTHING * bending), growth: 0.0, time: 0.0, off: false }
     }
-    fn observe(&mut self, view: View<'_>) {
-        let (own, potential) = energy(self.scene, view);
-        let (total, open) = (own + potential, open_work(self.scene, view));
+    /// After a step; `off` when the report says that a length was not kept in it: a thread that is to keep its length counts no energy of stretch.
+    fn observe(&mut self, world: &World, off: bool) {
+        let (own, potential) = energy(self.scene, world.view());
+        let (total, open) = (own + potential, open_work(self.scene, world));
         self.most = self.most.max(own).max((potential - self.start).abs());
-        let growth = (total - self.last - 2.0 * open.max(self.open)) / self.most;
-        if growth > self.growth || growth.is_nan() {
-            (self.growth, self.time) = (growth, view.time());
+        let growth = (total - self.last - open.max(self.open)) / self.most;
+        let excused = core::mem::replace(&mut self.off, off) || off;
+        if !excused && growth > self.growth || growth.is_nan() {
+            (self.growth, self.time) = (growth, world.time());
         }
         (self.last, self.open) = (total, open);
     }
 }
 
-/// Work of the tensions of inextensible threads over what their lengths may be off \[J\].
-fn open_work(scene: &Scene, view: View<'_>) -> f64 {
-    let rods = view.rods().zip(&scene.rods).filter(|(_, spec)| spec.stretch == Stretch::Inextensible);
+/// Part of a diameter by which the engine lets things overlap. A contact force works over that much, and this is no energy of a thread.
+const OVERLAP: f64 = 0.04;
+
+/// Work of the tensions of inextensible threads over what their lengths may be off, to either side, and of contact forces over the overlap that may be \[J\].
+fn open_work(scene: &Scene, world: &World) -> f64 {
+    let widest = scene.rods.iter().map(|r| r.radius).fold(0.0, f64::max);
+    let touching: f64 = world.contacts().map(|c| c.force.length() * 2.0 * widest * OVERLAP).sum();
+    let rods = world.view().rods().zip(&scene.rods).filter(|(_, spec)| spec.stretch == Stretch::Inextensible);
     let of = |rod: &RodView<'_>| rod.rest_lengths().iter().enumerate().map(|(e, l)| rod.tension(e).abs() * l * LENGTH_TOLERANCE).sum::<f64>();
-    rods.map(|(rod, _)| of(&rod)).sum()
+    touching + 2.0 * rods.map(|(rod, _)| of(&rod)).sum::<f64>()
 }
 
 /// Kinetic and elastic energy, and the potential of gravity and loads \[J\].

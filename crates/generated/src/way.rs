@@ -220,6 +220,8 @@ impl Way {
             substep: settings.substep * self.scale,
             linear_damping: self.damping(settings.linear_damping),
             angular_damping: self.damping(settings.angular_damping),
+            linear_drag: settings.linear_drag / self.scale,
+            angular_drag: settings.angular_drag / self.scale,
             ..settings.clone()
         }
     }

@@ -68,7 +68,7 @@ struct Sums {
     incidents: BTreeMap<&'static str, u64>,
     /// Scenes with an incident.
     with_incident: u64,
-    /// Most growth of energy in a substep, of scenes of first and of second order.
+    /// Most growth of energy in a step, of scenes of first and of second order.
     growth: [Vec<f64>; 2],
 }
 
@@ -165,7 +165,7 @@ impl Found {
         for (name, s) in &self.sums {
             for (growth, order) in s.growth.iter().zip(["implicit Euler", "second order"]).filter(|(g, _)| !g.is_empty()) {
                 let q = |part: f64| quantile(growth, part);
-                out += &format!("energy of {name}, {order}, most growth in a substep: median {:.1e}, 99 % {:.1e}, most {:.1e}\n", q(0.5), q(0.99), q(1.0));
+                out += &format!("energy of {name}, {order}, most growth in a step: median {:.1e}, 99 % {:.1e}, most {:.1e}\n", q(0.5), q(0.99), q(1.0));
             }
         }
         out += &format!("most of all in scene {} at {:.4} s\n", self.worst.0, self.worst.2);

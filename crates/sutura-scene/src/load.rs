@@ -414,6 +414,13 @@ impl<'d> Loader<'d> {
         if let Some(v) = in_range(table, "angular_damping", Dim::NUMBER, 0.0, 1.0 - 1e-12) {
             settings.angular_damping = v;
         }
+        // Beyond any physical rate, and far from where its product with a mass is no number.
+        if let Some(v) = in_range(table, "linear_drag", Dim::RATE, 0.0, 1e12) {
+            settings.linear_drag = v;
+        }
+        if let Some(v) = in_range(table, "angular_drag", Dim::RATE, 0.0, 1e12) {
+            settings.angular_drag = v;
+        }
     }
 
     fn friction(&mut self, root: &Table<'d>) -> Vec<(u32, u32, Friction, Location)> {

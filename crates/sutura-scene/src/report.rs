@@ -139,6 +139,10 @@ pub struct SolverReport {
     pub linear_damping: f64,
     /// Angular damping per second at the end of the run.
     pub angular_damping: f64,
+    /// Linear drag at the end of the run \[1/s\].
+    pub linear_drag: f64,
+    /// Angular drag at the end of the run \[1/s\].
+    pub angular_drag: f64,
     /// Gravity at the end of the run \[m/s^2\].
     pub gravity: [f64; 3],
 }

@@ -843,6 +843,8 @@ impl Runner {
             tolerance: s.tolerance,
             linear_damping: s.linear_damping,
             angular_damping: s.angular_damping,
+            linear_drag: s.linear_drag,
+            angular_drag: s.angular_drag,
             gravity: s.gravity.to_array(),
         }
     }

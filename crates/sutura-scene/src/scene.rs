@@ -152,6 +152,8 @@ pub(crate) enum Action {
     Solver {
         linear_damping: Option<f64>,
         angular_damping: Option<f64>,
+        linear_drag: Option<f64>,
+        angular_drag: Option<f64>,
         substep: Option<f64>,
         newton_max: Option<u32>,
         tolerance: Option<f64>,

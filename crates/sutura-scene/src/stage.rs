@@ -325,10 +325,12 @@ impl Stage {
                 }
                 self.set_gravity(*value)
             }
-            Action::Solver { linear_damping, angular_damping, substep, newton_max, tolerance } => {
+            Action::Solver { linear_damping, angular_damping, linear_drag, angular_drag, substep, newton_max, tolerance } => {
                 let mut s = self.world.settings().clone();
                 s.linear_damping = linear_damping.unwrap_or(s.linear_damping);
                 s.angular_damping = angular_damping.unwrap_or(s.angular_damping);
+                s.linear_drag = linear_drag.unwrap_or(s.linear_drag);
+                s.angular_drag = angular_drag.unwrap_or(s.angular_drag);
                 s.substep = substep.unwrap_or(s.substep);
                 s.newton_max = newton_max.unwrap_or(s.newton_max);
                 s.tolerance = tolerance.unwrap_or(s.tolerance);

@@ -248,7 +248,7 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 3 is the same without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
+/// First bytes of a recording: name and version. Version 3 is the same without drag and without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
 const VERSION: u32 = 4;
 const OLDEST: u32 = 2;
@@ -357,6 +357,54 @@ impl Bytes for ShapeSpec {
     }
 }
 
+/// Tag before the solver of settings that have drag: that follows.
+const DRAG: u8 = 2;
+
+/// Without drag they are as before there was any.
+impl Bytes for Settings {
+    fn put(&self, out: &mut Vec<u8>) {
+        let Settings { gravity, substep, newton_max, tolerance, linear_damping, angular_damping, .. } = self;
+        gravity.put(out);
+        substep.put(out);
+        newton_max.put(out);
+        tolerance.put(out);
+        linear_damping.put(out);
+        angular_damping.put(out);
+        let Settings { linear_drag, angular_drag, friction, halvings, integrator, solver, .. } = self;
+        friction.put(out);
+        halvings.put(out);
+        integrator.put(out);
+        if (*linear_drag, *angular_drag) != (0.0, 0.0) {
+            DRAG.put(out);
+            linear_drag.put(out);
+            angular_drag.put(out);
+        }
+        solver.put(out);
+    }
+    fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
+        let mut settings = Settings {
+            gravity: Bytes::take(input)?,
+            substep: Bytes::take(input)?,
+            newton_max: Bytes::take(input)?,
+            tolerance: Bytes::take(input)?,
+            linear_damping: Bytes::take(input)?,
+            angular_damping: Bytes::take(input)?,
+            linear_drag: 0.0,
+            angular_drag: 0.0,
+            friction: Bytes::take(input)?,
+            halvings: Bytes::take(input)?,
+            integrator: Bytes::take(input)?,
+            solver: Solver::Direct,
+        };
+        if input.left.first() == Some(&DRAG) {
+            let _: u8 = Bytes::take(input)?;
+            (settings.linear_drag, settings.angular_drag) = (Bytes::take(input)?, Bytes::take(input)?);
+        }
+        settings.solver = Bytes::take(input)?;
+        Ok(settings)
+    }
+}
+
 impl Bytes for Profile {
     fn put(&self, out: &mut Vec<u8>) {
         self.0.put(out);
@@ -366,7 +414,6 @@ impl Bytes for Profile {
     }
 }
 
-structure!(Settings { gravity, substep, newton_max, tolerance, linear_damping, angular_damping, friction, halvings, integrator, solver });
 structure!(PaperSettings { iterations, stretch_shear, bend, twist, direct_distance, friction, frame_inertia, order });
 structure!(Friction { stick, slide });
 structure!(Plasticity { yield_curvature, yield_twist, hardening });

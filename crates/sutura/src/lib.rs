@@ -4,6 +4,7 @@
 //! stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
 
 pub mod audit;
+mod budget;
 mod collide;
 pub mod error;
 pub mod handle;

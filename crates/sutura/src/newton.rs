@@ -290,7 +290,7 @@ fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
                 let change = state.orientation[e].conjugate() * (step[2 * e + 2] - step[2 * e]);
                 out += scratch.tension[e] / model.rest_length[e] * change.truncate().length_squared();
             }
-            kept += model.mass[e] / (h * h) * step[2 * e].length_squared();
+            kept += scratch.heavier[0] * model.mass[e] / (h * h) * step[2 * e].length_squared();
             if e > rod.start {
                 let before = step[2 * e - 1];
                 out += before.dot(scratch.moment[e].cross(turn));

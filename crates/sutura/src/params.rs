@@ -20,6 +20,11 @@ pub struct Settings {
     pub linear_damping: f64,
     /// Angular damping d_a in [0, 1), per second. Default 0.
     pub angular_damping: f64,
+    /// Linear drag c_v \[1/s\], >= 0: a force -c_v m v, by which a velocity falls to exp(-c_v t) of itself and what falls comes to g / c_v, whatever the substep.
+    /// It adds to the damping, which is a drag of -ln(1 - d_v). Default 0.
+    pub linear_drag: f64,
+    /// Angular drag c_a \[1/s\], >= 0, on the spin of cross-sections. Default 0.
+    pub angular_drag: f64,
     /// Friction where no pair of surfaces is set. Default 0.3 and 0.3.
     pub friction: Friction,
     /// How many times a substep may be halved, 0..=12. Default 12: what snaps free under load needs microseconds.
@@ -143,6 +148,8 @@ impl Default for Settings {
             tolerance: 3e-3,
             linear_damping: 0.0,
             angular_damping: 0.0,
+            linear_drag: 0.0,
+            angular_drag: 0.0,
             friction: Friction::coulomb(0.3),
             halvings: 12,
             integrator: Integrator::ImplicitEuler,
@@ -236,6 +243,8 @@ impl Settings {
         check(what, "tolerance", self.tolerance, self.tolerance > 0.0 && self.tolerance <= 0.1, "a number in (0, 0.1]")?;
         check(what, "linear_damping", self.linear_damping, (0.0..1.0).contains(&self.linear_damping), "a number in [0, 1)")?;
         check(what, "angular_damping", self.angular_damping, (0.0..1.0).contains(&self.angular_damping), "a number in [0, 1)")?;
+        check(what, "linear_drag", self.linear_drag, self.linear_drag >= 0.0, "a finite rate >= 0 [1/s]")?;
+        check(what, "angular_drag", self.angular_drag, self.angular_drag >= 0.0, "a finite rate >= 0 [1/s]")?;
         check(what, "halvings", f64::from(self.halvings), self.halvings <= 12, "at most 12")?;
         if let Solver::Paper(p) = &self.solver {
             p.validate()?;

@@ -56,6 +56,8 @@ pub enum Rejection {
     TooMuchWork,
     /// An inextensible thread cannot keep its length.
     LengthNotKept,
+    /// It would end with more energy than it began with, although nothing drives it.
+    EnergyGained,
     /// Two pieces of thread overlap by more than the force between them presses them into each other.
     ThreadOverlap,
     /// Two pieces of thread would pass through each other.
@@ -73,6 +75,7 @@ impl core::fmt::Display for Rejection {
             Rejection::NotConverged => "not converged",
             Rejection::TooMuchWork => "more work than a substep may take",
             Rejection::LengthNotKept => "an inextensible thread cannot keep its length",
+            Rejection::EnergyGained => "energy out of nothing",
             Rejection::ThreadOverlap => "threads overlap",
             Rejection::ThreadPassage => "threads would pass through each other",
             Rejection::ShapeOverlap => "a thread overlaps a shape",

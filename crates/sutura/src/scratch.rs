@@ -79,6 +79,8 @@ pub(crate) struct Scratch {
     /// Velocity and angular velocity there; not set by implicit Euler.
     pub carried: Vec<DVec3>,
     pub carried_spin: Vec<DVec3>,
+    /// Factors on mass and on moments of inertia by which drag within the solve makes things heavier.
+    pub heavier: [f64; 2],
     /// Start of the substep.
     pub start: Vec<DVec3>,
     pub start_frame: Vec<DQuat>,
@@ -124,6 +126,7 @@ pub(crate) struct Scratch {
     pub held: Vec<(u32, f64)>,
     pub candidates: Candidates,
     pub rows: Rows,
+    pub budget: crate::budget::Budget,
     /// Of the paper's solver.
     pub paper: crate::pbd::Work,
 }
@@ -143,6 +146,7 @@ impl Scratch {
     }
     /// Makes room for the model's arrays. Inextensible threads keep their length again.
     pub fn fit(&mut self, model: &crate::model::Model) {
+        self.heavier = [1.0; 2];
         let n = model.mass.len();
         self.target.resize(n, DVec3::ZERO);
         self.target_frame.resize(n, DQuat::IDENTITY);

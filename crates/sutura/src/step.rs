@@ -1,5 +1,6 @@
 //! The step. Stage order is decided here and nowhere else.
 
+use crate::budget::{self, Settled};
 use crate::collide::{self, Clearance};
 use crate::integrator::{self, Method, Stage, touches_anew};
 use crate::math::{Pose, exp, log};
@@ -55,7 +56,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
         let held = scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
-        grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
+        grip.pose = if whole && held.is_none() { grip.target } else { grip.pose.interpolate(&grip.target, held.unwrap_or(reached)) };
     }
     report.simulated = reached * interval.length;
     state.time = interval.start + interval.length;
@@ -69,6 +70,9 @@ const TAUT: f64 = 1e-3;
 
 /// Most that a thread keeps of its tension, over E A, where it begins to stretch.
 const KEPT_TENSION: f64 = 0.05;
+
+/// Halvings down to which a substep is not taken that makes energy.
+const FINE: u32 = 4;
 
 /// Halvings after which taut inextensible threads stretch, if there is still no acceptable substep.
 const GIVE_WAY: u32 = 4;
@@ -100,10 +104,10 @@ fn advance(
         outside_forces(model, state, scratch);
     }
     // Length that comes in has no past to go by.
-    let mut method = if reels { Method::Euler } else { Method::of(model, state.onset) };
+    let mut method = if reels { Method::Euler } else { Method::of(model, state.onset, h) };
     let mut attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
-    if attempt.touches_anew {
-        // What stops or jumps has no second derivative to go by, and would bounce.
+    if attempt.too_coarse {
+        // What stops or jumps has no second derivative to go by, and would bounce; what turns too far in a substep would gain energy.
         restore(state, scratch, depth);
         method = Method::Euler;
         attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
@@ -250,8 +254,8 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
 struct Attempt {
     outcome: newton::Outcome,
     verdict: Result<Clearance, Rejection>,
-    /// Whether it was of second order although contacts changed in it.
-    touches_anew: bool,
+    /// Whether it was of second order although contacts changed in it or it made energy.
+    too_coarse: bool,
 }
 
 /// The solves of a substep of length `h` from `t`, each looked at and accepted by itself.
@@ -301,15 +305,27 @@ fn solve(
         if verdict.is_ok() {
             touches = method != Method::Euler && touches_anew(&scratch.saved[depth as usize], state);
         }
-        let so_far = match (attempt, verdict) {
+        let mut so_far = match (attempt, verdict) {
             (Some(Attempt { outcome: before, verdict: Ok(c), .. }), Ok(d)) => Attempt {
                 outcome: newton::Outcome { converged: outcome.converged && before.converged, residual: outcome.residual.max(before.residual), ..outcome },
                 verdict: Ok(Clearance { thread: least(c.thread, d.thread), shape: least(c.shape, d.shape) }),
-                touches_anew: touches,
+                too_coarse: touches,
             },
-            (_, verdict) => Attempt { outcome, verdict, touches_anew: touches },
+            (_, verdict) => Attempt { outcome, verdict, too_coarse: touches },
         };
-        if stage.last || touches || so_far.verdict.is_err() {
+        if touches || so_far.verdict.is_err() {
+            return so_far;
+        }
+        if stage.last {
+            let saved = core::mem::take(&mut scratch.saved);
+            let last = depth >= FINE.min(model.settings.halvings);
+            match budget::settle(model, state, scratch, &saved[depth as usize], h, method, last) {
+                Settled::Well => {}
+                Settled::Coarse => so_far.too_coarse = true,
+                Settled::Gained if !last => so_far.verdict = Err(Rejection::EnergyGained),
+                Settled::Gained => {}
+            }
+            scratch.saved = saved;
             return so_far;
         }
         attempt = Some(so_far);

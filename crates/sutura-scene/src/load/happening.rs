@@ -93,6 +93,8 @@ impl<'d> Loader<'d> {
                 let action = Action::Solver {
                     linear_damping: has("linear_damping").then_some(s.linear_damping),
                     angular_damping: has("angular_damping").then_some(s.angular_damping),
+                    linear_drag: has("linear_drag").then_some(s.linear_drag),
+                    angular_drag: has("angular_drag").then_some(s.angular_drag),
                     substep: has("substep").then_some(s.substep),
                     newton_max: has("newton_max").then_some(s.newton_max),
                     tolerance: has("tolerance").then_some(s.tolerance),

@@ -214,8 +214,9 @@ fn project(model: &Model, state: &mut State, work: &mut Work, p: &PaperSettings)
 
 /// Velocities from the way made, then damping (P-11). There are no forces: what the state keeps of those is cleared.
 fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, h: f64) {
-    let keep_linear = libm::pow(1.0 - model.settings.linear_damping, h);
-    let keep_angular = libm::pow(1.0 - model.settings.angular_damping, h);
+    let s = &model.settings;
+    let keep_linear = libm::pow(1.0 - s.linear_damping, h) * libm::exp(-s.linear_drag * h);
+    let keep_angular = libm::pow(1.0 - s.angular_damping, h) * libm::exp(-s.angular_drag * h);
     for (_, rod) in model.rods.iter() {
         for i in rod.particles() {
             state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);

@@ -153,7 +153,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let (inertial, inertia) = self.spin(scratch, low, high, &own.axis);
         let (moment, kt) = self.joint(scratch, low + 1, high + 1);
         let (model, state) = (self.model, self.state);
-        let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2);
+        let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2 * scratch.heavier[0]);
         let off = Vec2::load(scratch.target[low], scratch.target[high]).less(&Vec2::load(state.position[low], state.position[high]));
         let push = Vec2::load(scratch.force[low], scratch.force[high]).plus(&off, w).less(&before.force).add(&own.force);
         let torque = Vec2::load(scratch.torque[low], scratch.torque[high]).add(&inertial).add(&own.torque).add(&moment.less(&before.moment));
@@ -178,7 +178,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
     /// Writes the rows of the last block, which has no element of its own.
     fn last_block(&self, scratch: &mut Scratch, before: &Carry) {
         let e = self.last;
-        let w = self.model.mass[e] * self.inv_h2;
+        let w = self.model.mass[e] * (self.inv_h2 * scratch.heavier[0]);
         let system = &mut scratch.system;
         system.diagonal[2 * e] = before.kx.add(&Sym2::scalar(f64x2::splat(w))).split().1;
         system.diagonal[2 * e + 1] = DMat3::IDENTITY;
@@ -247,7 +247,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
     #[inline(always)]
     fn spin(&self, scratch: &Scratch, low: usize, high: usize, t: &Vec2) -> (Vec2, Sym2) {
         let q = &self.state.orientation;
-        let (i0, i1) = (self.model.inertia[low] * self.inv_h2, self.model.inertia[high] * self.inv_h2);
+        let inv_h2 = self.inv_h2 * scratch.heavier[1];
+        let (i0, i1) = (self.model.inertia[low] * inv_h2, self.model.inertia[high] * inv_h2);
         let (x, z) = (lanes(i0.x, i1.x), lanes(i0.z, i1.z) - lanes(i0.x, i1.x));
         let turn = Quat2::load(scratch.target_frame[low], scratch.target_frame[high]).times(&Quat2::load(q[low], q[high]).conjugate());
         let (u0, u1) = turn.split();

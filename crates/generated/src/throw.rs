@@ -512,8 +512,11 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
     // Places held by pose must have room all along.
     for grip in scene.grips.iter().filter(|g| g.drive == Drive::Pose) {
         let at = if grip.place == Place::Start { x[0] } else { x[thread.n()] };
-        for k in 0..=4 * frames {
-            let time = 0.25 * f64::from(k) * frame;
+        // In steps of less than a third of a radius, so that not even a sheet is stepped over.
+        let speed = (grip.velocity - velocity).length() + spin.length() * (at - pose.position).length().max(0.02);
+        let steps = 4 * (frames as usize).max((f64::from(frames) * frame * speed / radius).ceil() as usize);
+        for k in 0..=steps {
+            let time = f64::from(frames) * frame * k as f64 / steps as f64;
             let shape = moved(&pose, velocity, spin, time.min(f64::from(moving) * frame));
             if near::shape(&t.geometry, &shape, &[at + grip.velocity * time]) < 1.3 * radius {
                 return None;

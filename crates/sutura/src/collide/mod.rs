@@ -5,7 +5,7 @@ pub(crate) mod segment;
 mod shape;
 mod tree;
 
-pub(crate) use shape::{Collider, Distance};
+pub(crate) use shape::{APART, Collider, Distance};
 
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;

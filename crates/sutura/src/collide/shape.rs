@@ -52,8 +52,8 @@ const WALLS: usize = 8;
 /// Sine of the angle up to which the direction from an edge may lean over a triangle beside it and still be that of a nearest place.
 const LEAN: f64 = 1e-6;
 
-/// Cosine up to which two nearest places of a mesh count as on different walls.
-const APART: f64 = 0.8;
+/// Cosine up to which two nearest places of a mesh count as on different walls: two facets with a hollow edge between them are.
+pub(crate) const APART: f64 = 0.9999;
 
 /// Our body axes to parry's and back.
 fn to_parry(p: DVec3) -> DVec3 {
@@ -97,19 +97,17 @@ impl Collider {
         Distance { value: sign * length, normal }
     }
 
-    /// Distance of a point that came from a place with the distance `before` in the direction `ahead` (both as seen by the body, then and now in the world). Where
-    /// what is nearest now does not face as the surface did then, the point has come to another wall or to the far side of a thin one: the surface is
-    /// taken to go on as a plane, behind which it is.
+    /// Distance of a point that came from a place with the distance `before`, from the same part of the surface. (`from` and `to` are the pose of the shape and the
+    /// point, then and now; `ahead` is the direction in which the surface faced at the last look.) What is nearest now may be another wall, or the far side of a
+    /// thin one: it faces back, or is nearer than a convex surface would be that is tangent to the one there was. Then the surface is taken to go on as a plane.
     pub fn follow(&self, from: (&Pose, DVec3, Distance), to: (&Pose, DVec3), ahead: DVec3) -> Distance {
         let now = self.distance(to.0, to.1);
-        let least = if matches!(self, Collider::Surface(_)) { FACING } else { 0.0 };
-        if now.normal.dot(ahead) > least {
-            return now;
-        }
-        let (from_pose, from_point, before) = from;
-        let normal = from_pose.orientation.inverse() * before.normal;
-        let way = to.0.inverse_transform_point(to.1) - from_pose.inverse_transform_point(from_point);
-        Distance { value: before.value + normal.dot(way), normal: to.0.orientation * normal }
+        let faces = now.normal.dot(ahead) > 0.0;
+        let Collider::Surface(_) = self else {
+            return if faces { now } else { plane(from, to) };
+        };
+        let plane = plane(from, to);
+        if faces && now.value >= plane.value - CONVEX * plane.value.abs() { now } else { plane }
     }
 
     /// Calls `found` with the distances, up to `reach`, of a world point from all walls of a mesh that face it from different sides, but for the nearest one.
@@ -230,8 +228,15 @@ impl Collider {
     }
 }
 
-/// Cosine between the directions of a mesh's surface before and after, from which on it is another wall.
-const FACING: f64 = 0.7;
+/// Part of a distance by which rounding may bring a convex surface nearer than its tangent.
+const CONVEX: f64 = 1e-9;
+
+/// Distance from the plane that a surface had, as seen from the body.
+fn plane((from_pose, from, before): (&Pose, DVec3, Distance), (pose, point): (&Pose, DVec3)) -> Distance {
+    let normal = from_pose.orientation.conjugate() * before.normal;
+    let way = pose.inverse_transform_point(point) - from_pose.inverse_transform_point(from);
+    Distance { value: before.value + normal.dot(way), normal: pose.orientation * normal }
+}
 
 impl Surface {
     fn new(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, Error> {

@@ -19,7 +19,7 @@
 //!
 //! [`couple`]: crate::row::couple
 
-use crate::collide::Distance;
+use crate::collide::{APART, Collider, Distance};
 use crate::math::{Pose, log, outer, skew};
 use crate::model::shape::ShapeMotion;
 use crate::model::{Model, ShapeModel};
@@ -641,6 +641,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
             continue;
         }
         let rows = &scratch.rows.shapes;
+        // Of a mesh facets are told apart; other surfaces turn in one piece.
+        let apart = if matches!(collider, Collider::Surface(_)) { APART } else { 0.7 };
         let mut pressed = None;
         let mut look = |s: f64, d: Distance| {
             let pressed = *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e));
@@ -651,7 +653,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
             let mut before = collider.distance(start_pose, at(site.start));
             let normal = pose.orientation * d.normal;
             let facing = (start_pose.orientation.conjugate() * before.normal).dot(d.normal);
-            if facing < 0.7 {
+            if facing < apart {
                 // It came from elsewhere to this wall, if it was before it.
                 let way = pose.inverse_transform_point(at(x)) - start_pose.inverse_transform_point(at(site.start));
                 before = Distance { value: d.value - d.normal.dot(way), normal: start_pose.orientation * d.normal };
@@ -664,7 +666,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
                 return;
             }
             let place = e as f64 + s;
-            let known = |row: &ShapeRow| row.shape == *slot && (row.place() - place).abs() * length < params::SAME_ROW * r && row.normal.dot(normal) > 0.7;
+            let known = |row: &ShapeRow| row.shape == *slot && (row.place() - place).abs() * length < params::SAME_ROW * r && row.normal.dot(normal) > apart;
             if !rows.iter().chain(&fresh).any(known) {
                 let mut row = site.row(s, before, Distance { value: d.value, normal });
                 (row.normal, row.gap, row.wanted) = (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);

@@ -206,8 +206,18 @@ impl Seen<'_> {
                         Hit { element: e, s, distance, crosses: true }
                     }
                     None => {
-                        let (s, d) = least(|s| shape.collider.distance(pose, a.lerp(b, s), None).value.abs() * if within { -1.0 } else { 1.0 });
-                        Hit { element: e, s, distance: d, crosses: false }
+                        let away = |s: f64| shape.collider.distance(pose, a.lerp(b, s), None).value.abs();
+                        let middle = away(0.5);
+                        let (s, distance) = if within {
+                            // As deep as the deepest particle; searching between them costs more than it tells.
+                            [(0.0, -away(0.0)), (0.5, -middle), (1.0, -away(1.0))].into_iter().fold((0.0, 0.0), |l, p| if p.1 < l.1 { p } else { l })
+                        } else if middle - 0.5 * a.distance(b) > radius[e] {
+                            // A distance grows no faster than the way.
+                            continue;
+                        } else {
+                            least(away)
+                        };
+                        Hit { element: e, s, distance, crosses: false }
                     }
                 }
             } else {

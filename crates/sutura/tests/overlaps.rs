@@ -109,7 +109,7 @@ fn time_that_passes_without_simulation_is_told() {
     let mut world = quiet();
     world.insert_rod(&along_x(0.0)).unwrap();
     let report = world.step(DT);
-    assert!((report.simulated - DT).abs() < 1e-15 && report.time == DT);
+    assert!((report.simulated - DT).abs() < 1e-15 && (report.time - DT).abs() < 1e-15);
     world.set_settings(Settings { gravity: DVec3::NEG_Z * 1e300, ..Settings::default() }).unwrap();
     let report = world.step(DT);
     assert!(report.simulated == 0.0 && (report.time - 2.0 * DT).abs() < 1e-15, "{report:?}");

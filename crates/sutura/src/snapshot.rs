@@ -265,7 +265,7 @@ impl Build {
         let mut rods: Vec<(u32, &RodModel)> = model.rods.iter().collect();
         rods.sort_unstable_by_key(|(_, r)| r.first);
         let rods = rods.into_iter().map(|(slot, rod)| BuiltRod::of(model, state, slot, rod)).collect();
-        let shape = |(slot, s): (u32, &ShapeModel)| BuiltShape { slot, geometry: hash_of(&s.geometry) };
+        let shape = |(slot, s): (u32, &ShapeModel)| BuiltShape { slot, geometry: s.hash };
         let place = |m: &Member| (m.rod, m.particle as i32 - crate::reel::added(state, m.rod, false));
         let weld = |(slot, w): (u32, &WeldModel)| BuiltWeld { slot, places: w.members.iter().map(place).collect() };
         Build { materials: made_of(model), rods, shapes: model.shapes.iter().map(shape).collect(), welds: model.welds.iter().map(weld).collect() }
@@ -343,7 +343,7 @@ pub(crate) fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
-fn hash_of(value: &impl Bytes) -> u64 {
+pub(crate) fn hash_of(value: &impl Bytes) -> u64 {
     let mut bytes = Vec::new();
     value.put(&mut bytes);
     fnv(&bytes)

@@ -411,7 +411,8 @@ impl World {
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
         let Checked { geometry, closed, container, notes } = spec.check()?;
         let collider = crate::collide::Collider::new(&geometry)?;
-        let shape = ShapeModel { geometry, collider, surface: spec.surface, motion: spec.motion, closed, container, notes };
+        let hash = crate::snapshot::hash_of(&geometry);
+        let shape = ShapeModel { geometry, hash, collider, surface: spec.surface, motion: spec.motion, closed, container, notes };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
         self.model.placed.shapes.push(handle.index);
         let n = self.model.shapes.len();

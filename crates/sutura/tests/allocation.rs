@@ -8,8 +8,8 @@ mod support;
 use support::{overhand, quiet, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, ReelLaw, ReelSpec, RodSpec, Settings, ShapeSpec,
-    Stretch, WeldSpec, World,
+    Drive, Friction, Geometry, GripSpec, Handle, Hold, Incident, IncidentKind, Integrator, LoadKind, LoadSpec, Material, Place, Pose, ReelLaw, ReelSpec,
+    RodSpec, Settings, ShapeSpec, Stretch, WeldSpec, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -37,8 +37,9 @@ fn second_run(world: &mut World, frames: u32, mut drive: impl FnMut(&mut World, 
             let mut report = None;
             let info = allocation_counter::measure(|| report = Some(world.step(DT)));
             let report = report.unwrap();
-            // A report of an incident is a vector that grows; here there are none.
-            assert!(report.incidents.is_empty(), "frame {frame}: {:?}", report.incidents);
+            // A report of an incident is a vector that grows; here there are none, but for what the first step of all says of how the thread lies.
+            let known = |i: &Incident| run == 0 && frame == 0 && matches!(i.kind, IncidentKind::Overlap(_));
+            assert!(report.incidents.iter().all(known), "frame {frame}: {:?}", report.incidents);
             if run == 1 {
                 second.allocations += info.count_total;
                 second.steps += u32::from(info.count_total > 0);

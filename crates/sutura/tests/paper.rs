@@ -258,7 +258,9 @@ fn absurd_numbers_leave_a_finite_state() {
             let view = world.rod(rod).unwrap();
             let vectors = view.positions().iter().chain(view.velocities()).chain(view.angular_velocities());
             assert!(vectors.into_iter().all(|v| v.is_finite()) && view.energy().total().is_finite(), "{size:e}");
-            assert!(report.incidents.iter().all(|i| i.kind == IncidentKind::NotFinite), "{:?}", report.incidents);
+            // It is inserted in the cylinder, which is said at first.
+            let known = |k: &IncidentKind| matches!(k, IncidentKind::NotFinite | IncidentKind::Overlap(_));
+            assert!(report.incidents.iter().all(|i| known(&i.kind)), "{:?}", report.incidents);
         }
     }
 }

@@ -68,6 +68,8 @@ impl Overlap {
 
 /// One pair of elements that lie in each other.
 struct Pair {
+    a: usize,
+    b: usize,
     s: f64,
     t: f64,
     apart: f64,
@@ -137,28 +139,29 @@ impl Seen<'_> {
                 let along = model.rod_of[a] == model.rod_of[b] && arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] + room;
                 let fork = |w: &crate::model::weld::WeldModel| super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b) < w.exempt + room;
                 let fold = along || model.welds.iter().any(|(_, w)| fork(w));
-                pairs.insert((a, b), Pair { s: c.s, t: c.t, apart, fold });
+                pairs.insert((a, b), Pair { a, b, s: c.s, t: c.t, apart, fold });
             }
         });
         // Pieces that belong together: neighboring elements of the one in neighboring elements of the other.
         let mut found = Vec::new();
-        while let Some((&first, _)) = pairs.iter().next() {
-            let mut stack: Vec<((usize, usize), Pair)> = pairs.remove_entry(&first).into_iter().collect();
-            let (mut deepest, mut through, mut fold): (Option<((usize, usize), Pair)>, bool, bool) = (None, false, false);
-            while let Some(((a, b), pair)) = stack.pop() {
-                for i in a.saturating_sub(1)..=a + 1 {
-                    for j in b.saturating_sub(1)..=b + 1 {
-                        stack.extend(pairs.remove_entry(&(i, j)));
+        while let Some((_, first)) = pairs.pop_first() {
+            let (mut stack, mut deepest) = (vec![first], None::<Pair>);
+            let (mut through, mut fold) = (false, false);
+            while let Some(pair) = stack.pop() {
+                for i in pair.a.saturating_sub(1)..=pair.a + 1 {
+                    for j in pair.b.saturating_sub(1)..=pair.b + 1 {
+                        stack.extend(pairs.remove(&(i, j)));
                     }
                 }
-                through |= pair.apart < radius[a].max(radius[b]);
+                through |= pair.apart < radius[pair.a].max(radius[pair.b]);
                 fold |= pair.fold;
-                let deeper = |((i, j), p): &((usize, usize), Pair)| radius[*i] + radius[*j] - p.apart < radius[a] + radius[b] - pair.apart;
-                if deepest.as_ref().is_none_or(deeper) {
-                    deepest = Some(((a, b), pair));
+                let depth = |p: &Pair| radius[p.a] + radius[p.b] - p.apart;
+                if deepest.as_ref().is_none_or(|d| depth(d) < depth(&pair)) {
+                    deepest = Some(pair);
                 }
             }
-            let Some(((a, b), pair)) = deepest else { continue };
+            let Some(pair) = deepest else { continue };
+            let Pair { a, b, .. } = pair;
             let ((rod, arc), (other, other_arc)) = (self.place(a, pair.s), self.place(b, pair.t));
             let depth = radius[a] + radius[b] - pair.apart;
             found.push(Overlap {
@@ -205,8 +208,18 @@ impl Seen<'_> {
                         Hit { element: e, s, distance, crosses: true }
                     }
                     None => {
-                        let (s, d) = least(|s| shape.collider.distance(pose, a.lerp(b, s)).value.abs() * if within { -1.0 } else { 1.0 });
-                        Hit { element: e, s, distance: d, crosses: false }
+                        let away = |s: f64| shape.collider.distance(pose, a.lerp(b, s)).value.abs();
+                        let middle = away(0.5);
+                        let (s, distance) = if within {
+                            // As deep as the deepest particle; searching between them costs more than it tells.
+                            [(0.0, -away(0.0)), (0.5, -middle), (1.0, -away(1.0))].into_iter().fold((0.0, 0.0), |l, p| if p.1 < l.1 { p } else { l })
+                        } else if middle - 0.5 * a.distance(b) > radius[e] {
+                            // A distance grows no faster than the way.
+                            continue;
+                        } else {
+                            least(away)
+                        };
+                        Hit { element: e, s, distance, crosses: false }
                     }
                 }
             } else {

@@ -70,6 +70,15 @@ struct Side {
     ascending: bool,
 }
 
+/// A triangle beyond an edge of another.
+#[derive(Debug, Clone, Copy)]
+struct Neighbor {
+    face: usize,
+    /// Whether both run the same way along the edge, so that one has to be turned.
+    against: bool,
+    edge: (u32, u32),
+}
+
 /// The edge of a hole, corner by corner.
 struct Hole {
     middle: DVec3,
@@ -265,12 +274,12 @@ fn crowded(vertices: &[DVec3], faces: &[Face], crowd: &[Side]) -> Error {
 
 /// Turns triangles so that neighbors agree; the component of each, numbered from zero.
 fn orient(vertices: &[DVec3], faces: &mut [Face], sides: &[Side], notes: &mut Vec<String>) -> Result<Vec<usize>, Error> {
-    // Neighbors of each triangle over each pair, and whether they run the same way along the edge, so that one has to be turned.
-    let mut next: Vec<Vec<(usize, bool, (u32, u32))>> = vec![Vec::new(); faces.len()];
+    let mut next: Vec<Vec<Neighbor>> = vec![Vec::new(); faces.len()];
     for pair in sides.chunk_by(|a, b| a.edge == b.edge).filter(|c| c.len() == 2) {
         let against = pair[0].ascending == pair[1].ascending;
-        next[pair[0].face as usize].push((pair[1].face as usize, against, pair[0].edge));
-        next[pair[1].face as usize].push((pair[0].face as usize, against, pair[0].edge));
+        for (of, with) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+            next[of.face as usize].push(Neighbor { face: with.face as usize, against, edge: of.edge });
+        }
     }
     let mut component = vec![usize::MAX; faces.len()];
     let mut turned = vec![false; faces.len()];
@@ -282,7 +291,7 @@ fn orient(vertices: &[DVec3], faces: &mut [Face], sides: &[Side], notes: &mut Ve
         let (mut members, mut stack) = (vec![start], vec![start]);
         component[start] = n_components;
         while let Some(i) = stack.pop() {
-            for (k, against, edge) in &next[i] {
+            for Neighbor { face: k, against, edge } in &next[i] {
                 if component[*k] == usize::MAX {
                     component[*k] = n_components;
                     turned[*k] = turned[i] ^ against;

@@ -76,6 +76,8 @@ pub(crate) struct Placed {
 /// A shape, checked and ready for queries.
 pub(crate) struct ShapeModel {
     pub geometry: Geometry,
+    /// Hash of the geometry, for snapshots.
+    pub hash: u64,
     pub collider: crate::collide::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,

@@ -59,6 +59,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     // good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
+    // Inextensible elements at a weld have their stiffness in the matrix, and the digits that this costs are those of the next iteration.
+    let firm = |rod: u32| model.rods.at(rod).is_some_and(|r| r.stretch == crate::Stretch::Inextensible);
+    let least = if model.welds.iter().any(|(_, weld)| weld.members.iter().any(|m| firm(m.rod))) { 2 } else { 1 };
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
@@ -91,7 +94,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         let blocks = core::mem::take(&mut scratch.rods);
         scratch.step.copy_from_slice(&scratch.rhs);
         for (rod, zone) in &blocks {
-            scratch.system.solve(rod.clone(), zone, &mut scratch.step);
+            scratch.system.solve_all(rod.clone(), zone, &mut scratch.step);
             scratch.torque_correction.apply(&scratch.system, rod, zone, &scratch.torque, &mut scratch.step);
         }
         scratch.rods = blocks;
@@ -116,6 +119,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         (before, moved_before) = (out.turn, out.residual);
         let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
         if rests
+            && out.iterations >= least.min(settings.newton_max)
             && length_error(model, state, scratch) <= LENGTH_TOLERANCE
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
@@ -172,14 +176,14 @@ fn work_of_excess(model: &Model, state: &State, scratch: &Scratch, excess: impl 
     elements.map(on).sum()
 }
 
-/// Stiffness of an element along its directors as it was last assembled.
-fn stiffness(model: &Model, scratch: &Scratch, e: usize) -> DVec3 {
-    model.stretch_stiffness[e].truncate().extend(scratch.axial(model, e).0)
-}
-
 /// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds up.
 fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
-    work(scratch) - work_of_excess(model, state, scratch, |e, change| stiffness(model, scratch, e) * change)
+    let built_up = |e: usize, change: DVec3| {
+        let (axial, at_rest) = scratch.axial(model, e);
+        let known = if model.is_tied(e) { axial * element_strain(model, state, e).z + at_rest - scratch.tension[e] } else { 0.0 };
+        (model.stretch_stiffness[e].truncate() * change.truncate()).extend(axial * change.z + known)
+    };
+    work(scratch) - work_of_excess(model, state, scratch, built_up)
 }
 
 /// Work of the forces at the iterate along the last step, with the stretch and shear forces that the step predicted: those of the strain itself hold an
@@ -187,8 +191,9 @@ fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let error = |e: usize, _| {
         let (axial, at_rest) = scratch.axial(model, e);
-        let force = element_strain(model, state, e) * model.stretch_stiffness[e].truncate().extend(axial);
-        force - scratch.shear[e].extend(scratch.tension[e] - at_rest)
+        let strain = element_strain(model, state, e);
+        let tension = if model.is_tied(e) { 0.0 } else { axial * strain.z + at_rest - scratch.tension[e] };
+        (strain.truncate() * model.stretch_stiffness[e].truncate() - scratch.shear[e]).extend(tension)
     };
     work(scratch) + work_of_excess(model, state, scratch, error) - row::shape::work_unforeseen(scratch)
 }

@@ -131,6 +131,11 @@ impl Model {
             self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, stiffer * section.ea) / self.rest_length[e];
         }
     }
+    /// Whether the tension of an element is an unknown of the linear system: in an inextensible thread, but for elements at a weld.
+    #[inline(always)]
+    pub(crate) fn is_tied(&self, e: usize) -> bool {
+        self.inextensible[e] && self.weld_of[e].is_none() && self.weld_of[e + 1].is_none()
+    }
     /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of the next.
     pub(crate) fn refresh_joint(&mut self, e: usize) {
         let joint = e > 0 && self.is_element(e) && self.is_element(e - 1) && self.rod_of[e] == self.rod_of[e - 1];

@@ -128,6 +128,11 @@ struct Element {
     kx: Sym2,
     kd: [Vec2; 3],
     kt: Sym2,
+    /// The line between its ends, and the compliance along it where the tension is an unknown, else 0.
+    line: Vec2,
+    give: f64x2,
+    /// What its tension over its stiffness is beyond its elongation.
+    off: f64x2,
 }
 
 /// Where it is assembled. `FLAT`: joints may be stiffer one way than the other.
@@ -169,6 +174,13 @@ impl<const FLAT: bool> At<'_, FLAT> {
         (system.next[x.0], system.next[x.1]) = (-a, -b);
         (system.next[t.0], system.next[t.1]) = (a.transpose(), b.transpose());
         (system.after[x.0], system.after[x.1]) = own.kx.skew_less(&none);
+        if self.keeps_length {
+            let (line, give) = (own.line.split(), own.give.to_array());
+            let tie = |line: DVec3, give: f64| if give > 0.0 { ([-line, line], give) } else { ([DVec3::ZERO; 2], 1.0) };
+            (system.ties[low], system.ties[high]) = (tie(line.0, give[0]), tie(line.1, give[1]));
+            [system.right[low], system.right[high]] = own.off.to_array();
+        }
+        (system.tied[low], system.tied[high]) = (self.keeps_length, self.keeps_length);
         (system.diagonal[t.0], system.diagonal[t.1]) = inertia.add(&own.kt).add(&before.kt).add(&kt).split();
         // Rotations do not commute: relative to the joint, exp(-phi0) exp(phi1) turns by phi1 - phi0 - phi0 x phi1 / 2.
         (system.after[t.0], system.after[t.1]) = kt.skew_less(&half);
@@ -182,6 +194,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let system = &mut scratch.system;
         system.diagonal[2 * e] = before.kx.add(&Sym2::scalar(f64x2::splat(w))).split().1;
         system.diagonal[2 * e + 1] = DMat3::IDENTITY;
+        (system.ties[e], system.right[e]) = (([DVec3::ZERO; 2], 1.0), 0.0);
+        system.tied[e] = self.keeps_length;
         for node in [2 * e, 2 * e + 1] {
             system.next[node] = DMat3::ZERO;
             system.after[node] = DMat3::ZERO;
@@ -218,7 +232,12 @@ impl<const FLAT: bool> At<'_, FLAT> {
         } else {
             (t, along, c - a)
         };
-        let pull = if self.given { lanes(t0, t1) } else { c * (stretched - l) + lanes(p0, p1) };
+        let tension = lanes(t0, t1);
+        // The elements at a weld have their stiffness in the matrix.
+        let tied = |e: usize| if model.is_tied(e) { 1.0 } else { 0.0 };
+        let tied = if self.keeps_length { lanes(tied(low), tied(high)) } else { f64x2::ZERO };
+        let of_strain = c * (stretched - l) + lanes(p0, p1);
+        let pull = if self.given { tension } else { of_strain + tied * (tension - of_strain) };
         let force = d.plus(&t, -along).scaled(a).plus(&line, pull);
         // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
         // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
@@ -238,8 +257,14 @@ impl<const FLAT: bool> At<'_, FLAT> {
             let shear = r1.scaled(lanes(s0.x, s1.x) * half).plus(&r2, lanes(s0.y, s1.y) * half);
             kt = kt.less_product(&shear, &t);
         }
-        let kx = if self.keeps_length { Sym2::scalar(a + g).square(&t, b).square(&line, c - g) } else { Sym2::scalar(a + g).square(&t, b - g) };
-        Element { axis: t, force, torque: d.cross(&force), kx, kd, kt }
+        let (kx, give) = if self.keeps_length {
+            let one = f64x2::splat(1.0);
+            (Sym2::scalar(a + g).square(&t, b).square(&line, c * (one - tied) - g), tied / c)
+        } else {
+            (Sym2::scalar(a + g).square(&t, b - g), f64x2::ZERO)
+        };
+        let off = tied * (tension - of_strain) / c;
+        Element { axis: t, force, torque: d.cross(&force), kx, kd, kt, line, give, off }
     }
 
     /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the latter with the frame

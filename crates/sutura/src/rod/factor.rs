@@ -5,9 +5,13 @@
 //! pentadiagonal with 3x3 blocks. It is factored as L D L^T without square roots, each 3x3 pivot as l d l^T (a pivot's closed-form
 //! inverse would lose all digits: stretch is 1e8 times stiffer than the rest).
 //!
+//! The tension of an inextensible element is an unknown besides, eliminated between its two particles: as a stiffness in their blocks it would take the
+//! digits of masses with it, which are 1e-13 of it. The matrix is quasi-definite then, and any order of elimination is stable [Vanderbei 1995].
+//!
 //! Elimination runs from both ends of a rod toward a zone of blocks `[lo, hi]` (a block is x_i with theta_i) and then through the
 //! zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone alone.
 
+use crate::math::outer;
 use crate::rod::lanes::{Vec2, lanes};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -118,6 +122,39 @@ impl Block {
     }
 }
 
+/// A multiplier of an element with what it couples to: the tension of an inextensible one. Its own entry is minus its compliance, so it
+/// takes the sign of a pivot with it but no digits, however small the compliance is. It is eliminated after the first of the element's particles.
+#[derive(Debug, Clone, Copy, Default)]
+struct Link {
+    /// `l^-1` of its coupling to that particle.
+    own: DVec3,
+    /// Coupling to the two nodes that come after, when the particle is eliminated.
+    next: DVec3,
+    after: DVec3,
+    /// Minus the reciprocal of its pivot.
+    inv: f64,
+}
+
+impl Link {
+    #[inline(always)]
+    fn new(p: &Pivot, [a, b]: [DVec3; 2], give: f64, w1: &DMat3, w2: &DMat3) -> Self {
+        let own = p.lower(a);
+        let s = own * p.inv;
+        Link { own, next: -t_vec(w1, s), after: b - t_vec(w2, s), inv: 1.0 / (give + own.dot(s)) }
+    }
+    /// What it takes to the right sides of the two nodes, where that of the particle is `s` and its own is `right`.
+    #[inline(always)]
+    fn forward(&self, s: DVec3, right: f64) -> (DVec3, DVec3) {
+        let t = (right - self.own.dot(s)) * self.inv;
+        (self.next * t, self.after * t)
+    }
+    /// What it does to the particle, before `l^-T`.
+    #[inline(always)]
+    fn back(&self, p: &Pivot, s: DVec3, right: f64, next: DVec3, after: DVec3) -> DVec3 {
+        self.own * p.inv * ((self.next.dot(next) + self.after.dot(after) + self.own.dot(s) - right) * self.inv)
+    }
+}
+
 /// The system of all rods. Node `2 i` is particle i, node `2 i + 1` frame i. Assembled, then factored in place.
 #[derive(Default)]
 pub(crate) struct System {
@@ -125,6 +162,13 @@ pub(crate) struct System {
     /// Coupling of each node to the next one and to the one after it: `a[k][k + 1]`, `a[k][k + 2]`.
     pub next: Vec<DMat3>,
     pub after: Vec<DMat3>,
+    /// Whether a block is one of a rod whose elements have multipliers.
+    pub tied: Vec<bool>,
+    /// Coupling of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has none.
+    pub ties: Vec<([DVec3; 2], f64)>,
+    /// Right side of each multiplier's row.
+    pub right: Vec<f64>,
+    links: Vec<Link>,
     pivots: Vec<Pivot>,
     /// Inverse of the matrix at zone blocks, and transfer `z_i = -k_i z_{i+1}` between them.
     inverse: Vec<Block>,
@@ -137,6 +181,10 @@ impl System {
         self.diagonal.resize(n, DMat3::ZERO);
         self.next.resize(n, DMat3::ZERO);
         self.after.resize(n, DMat3::ZERO);
+        self.tied.resize(n_particles, false);
+        self.ties.resize(n_particles, ([DVec3::ZERO; 2], 1.0));
+        self.right.resize(n_particles, 0.0);
+        self.links.resize(n_particles, Link::default());
         self.pivots.resize(n, Pivot::default());
         self.inverse.resize(n_particles, Block::default());
         self.transfer.resize(n_particles, Block::default());
@@ -156,12 +204,29 @@ impl System {
         if node >= 2 {
             self.after[node - 2] *= keep;
         }
+        if node.is_multiple_of(2) && self.tied[node / 2] {
+            let e = node / 2;
+            self.ties[e].0[0] = keep * self.ties[e].0[0];
+            if e >= 1 {
+                self.ties[e - 1].0[1] = keep * self.ties[e - 1].0[1];
+            }
+        }
+    }
+
+    /// The multiplier that is eliminated with node `k` toward higher nodes, or toward lower ones.
+    #[inline(always)]
+    fn tie(&self, k: usize, up: bool) -> Option<usize> {
+        (k.is_multiple_of(2) && self.tied[k / 2]).then(|| if up { k / 2 } else { k / 2 - 1 })
     }
 
     /// Factors the rod whose blocks are `blocks`; the zone must lie within. False when the matrix is not positive definite.
     pub fn factor(&mut self, blocks: Range<usize>, zone: &Range<usize>) -> bool {
         let both = both(&blocks, zone);
-        self.eliminate_both(2 * blocks.start, 2 * blocks.end - 1, both);
+        if self.tied[blocks.start] {
+            self.eliminate_both::<true>(2 * blocks.start, 2 * blocks.end - 1, both);
+        } else {
+            self.eliminate_both::<false>(2 * blocks.start, 2 * blocks.end - 1, both);
+        }
         for k in 2 * blocks.start + both..2 * zone.start {
             self.eliminate_up(k);
         }
@@ -184,7 +249,7 @@ impl System {
 
     /// Eliminates `count` nodes from `low` on toward higher nodes and as many from `high` on toward lower ones, one of each at a time in the
     /// two lanes of a vector: each end's nodes wait for one another, the two ends do not.
-    fn eliminate_both(&mut self, low: usize, high: usize, count: usize) {
+    fn eliminate_both<const TIED: bool>(&mut self, low: usize, high: usize, count: usize) {
         if count == 0 {
             return;
         }
@@ -203,6 +268,29 @@ impl System {
             d0 = d1.less_square(&w1, &s1);
             d1 = d2.less_square(&w2, &s2);
             n0 = n1.less_product(&w1, &s2);
+            if TIED {
+                // One of the two is a particle.
+                let none = ([DVec3::ZERO; 2], 1.0);
+                let (e, low, high) = if i % 2 == 0 {
+                    (k / 2, self.ties[k / 2], none)
+                } else {
+                    let ([a, b], give) = self.ties[m / 2 - 1];
+                    (m / 2 - 1, none, ([b, a], give))
+                };
+                let own = p.lower(&Vec2::load(low.0[0], high.0[0]));
+                let s = own.times(&p.inv);
+                let inv = f64x2::splat(1.0) / (lanes(low.1, high.1) + own.dot(&s));
+                let zero = Vec2::load(DVec3::ZERO, DVec3::ZERO);
+                let (next, after) = (zero.less_t_vec(&w1, &s), Vec2::load(low.0[1], high.0[1]).less_t_vec(&w2, &s));
+                d0 = d0.plus_product(&next, &next.scaled(inv));
+                n0 = n0.plus_product(&next, &after.scaled(inv));
+                d1 = d1.plus_product(&after, &after.scaled(inv));
+                let of = |lane: usize| {
+                    let pick = |v: &Vec2| if lane == 0 { v.split().0 } else { v.split().1 };
+                    Link { own: pick(&own), next: pick(&next), after: pick(&after), inv: inv.to_array()[lane] }
+                };
+                self.links[e] = of(i % 2);
+            }
             w1.store(&mut self.next, k, m - 1);
             w2.store(&mut self.after, k, m - 2);
             (self.pivots[k], self.pivots[m]) = p.split();
@@ -224,6 +312,14 @@ impl System {
         self.diagonal[k + 1] -= t_mul(&w1, &s1);
         self.next[k + 1] -= t_mul(&w1, &s2);
         self.diagonal[k + 2] -= t_mul(&w2, &s2);
+        if let Some(e) = self.tie(k, true) {
+            let (tie, give) = self.ties[e];
+            let link = Link::new(&p, tie, give, &w1, &w2);
+            self.diagonal[k + 1] += outer(link.next, link.next * link.inv);
+            self.next[k + 1] += outer(link.next, link.after * link.inv);
+            self.diagonal[k + 2] += outer(link.after, link.after * link.inv);
+            self.links[e] = link;
+        }
         self.next[k] = w1;
         self.after[k] = w2;
         self.pivots[k] = p;
@@ -239,21 +335,43 @@ impl System {
         self.diagonal[k - 1] -= t_mul(&w1, &s1);
         self.next[k - 2] -= t_mul(&w2, &s1);
         self.diagonal[k - 2] -= t_mul(&w2, &s2);
+        if let Some(e) = self.tie(k, false) {
+            let ([a, b], give) = self.ties[e];
+            let link = Link::new(&p, [b, a], give, &w1, &w2);
+            self.diagonal[k - 1] += outer(link.next, link.next * link.inv);
+            self.next[k - 2] += outer(link.after, link.next * link.inv);
+            self.diagonal[k - 2] += outer(link.after, link.after * link.inv);
+            self.links[e] = link;
+        }
         self.next[k - 1] = w1;
         self.after[k - 2] = w2;
         self.pivots[k] = p;
     }
 
-    /// Solves for one right side of the rod, in place. `factor` must have run with the same ranges.
+    /// Solves for one right side of the rod, in place, that of the multipliers being zero. `factor` must have run with the same ranges.
     pub fn solve(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3]) {
+        self.solve_part(blocks, zone, z, 0.0);
+    }
+
+    /// The same with the multipliers' own right sides.
+    pub fn solve_all(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3]) {
+        self.solve_part(blocks, zone, z, 1.0);
+    }
+
+    /// The same with a part of them.
+    fn solve_part(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3], part: f64) {
         let (first, last) = (2 * blocks.start, 2 * blocks.end);
         let (lo, hi) = (2 * zone.start, 2 * zone.end);
         let both = both(&blocks, zone);
         // Forward: y = l^-1 r, then what it leaves in the nodes it couples to.
-        self.forward_both(first, last - 1, both, z);
-        self.forward_up(first + both..lo, z);
-        self.forward_down(hi..last - both, z);
-        self.forward_up(lo..hi - 2, z);
+        if self.tied[blocks.start] {
+            self.forward_both::<true>(first, last - 1, both, z, part);
+        } else {
+            self.forward_both::<false>(first, last - 1, both, z, part);
+        }
+        self.forward_up(first + both..lo, z, part);
+        self.forward_down(hi..last - both, z, part);
+        self.forward_up(lo..hi - 2, z, part);
         let k = hi - 2;
         let p = &self.pivots[k];
         z[k] = p.lower(z[k]) * p.inv;
@@ -264,36 +382,60 @@ impl System {
         z[k] = p.upper(z[k] - (self.next[k] * z[k + 1]) * p.inv);
         for k in (first + both..hi - 2).rev() {
             let p = &self.pivots[k];
-            z[k] = p.upper(z[k] - (self.next[k] * z[k + 1] + self.after[k] * z[k + 2]) * p.inv);
+            let tied = self.tie(k, true).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k + 1], z[k + 2]));
+            z[k] = p.upper(z[k] - (self.next[k] * z[k + 1] + self.after[k] * z[k + 2]) * p.inv - tied);
         }
         for k in hi..last - both {
             let p = &self.pivots[k];
-            z[k] = p.upper(z[k] - (self.next[k - 1] * z[k - 1] + self.after[k - 2] * z[k - 2]) * p.inv);
+            let tied = self.tie(k, false).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k - 1], z[k - 2]));
+            z[k] = p.upper(z[k] - (self.next[k - 1] * z[k - 1] + self.after[k - 2] * z[k - 2]) * p.inv - tied);
         }
-        self.backward_both(first, last - 1, both, z);
+        if self.tied[blocks.start] {
+            self.backward_both::<true>(first, last - 1, both, z, part);
+        } else {
+            self.backward_both::<false>(first, last - 1, both, z, part);
+        }
     }
 
-    fn forward_up(&self, nodes: Range<usize>, z: &mut [DVec3]) {
+    fn forward_up(&self, nodes: Range<usize>, z: &mut [DVec3], part: f64) {
         for k in nodes {
             let p = &self.pivots[k];
             z[k] = p.lower(z[k]) * p.inv;
             let s = z[k];
             z[k + 1] -= t_vec(&self.next[k], s);
             z[k + 2] -= t_vec(&self.after[k], s);
+            if let Some(e) = self.tie(k, true) {
+                let (next, after) = self.links[e].forward(s, part * self.right[e]);
+                z[k + 1] += next;
+                z[k + 2] += after;
+            }
         }
     }
 
-    fn forward_down(&self, nodes: Range<usize>, z: &mut [DVec3]) {
+    fn forward_down(&self, nodes: Range<usize>, z: &mut [DVec3], part: f64) {
         for k in nodes.rev() {
             let p = &self.pivots[k];
             z[k] = p.lower(z[k]) * p.inv;
             let s = z[k];
             z[k - 1] -= t_vec(&self.next[k - 1], s);
             z[k - 2] -= t_vec(&self.after[k - 2], s);
+            if let Some(e) = self.tie(k, false) {
+                let (next, after) = self.links[e].forward(s, part * self.right[e]);
+                z[k - 1] += next;
+                z[k - 2] += after;
+            }
         }
     }
 
-    fn forward_both(&self, low: usize, high: usize, count: usize, z: &mut [DVec3]) {
+    /// The multiplier of step `i` of both ends, in the lane of the end that is at a particle.
+    #[inline(always)]
+    fn links(&self, i: usize, k: usize, m: usize) -> Link2 {
+        let none = (Link::default(), 0.0);
+        let of = |e: usize| (self.links[e], self.right[e]);
+        if i.is_multiple_of(2) { Link2::join(&of(k / 2), &none) } else { Link2::join(&none, &of(m / 2 - 1)) }
+    }
+
+    fn forward_both<const TIED: bool>(&self, low: usize, high: usize, count: usize, z: &mut [DVec3], part: f64) {
         if count == 0 {
             return;
         }
@@ -306,13 +448,18 @@ impl System {
             (z[k], z[m]) = s.split();
             z0 = z1.less_t_vec(&Mat2::pair(&self.next[k], &self.next[m - 1]), &s);
             z1 = Vec2::load(z[k + 2], z[m - 2]).less_t_vec(&Mat2::pair(&self.after[k], &self.after[m - 2]), &s);
+            if TIED {
+                let link = self.links(i, k, m);
+                let t = (link.right * part - link.own.dot(&s)) * link.inv;
+                (z0, z1) = (z0.plus(&link.next, t), z1.plus(&link.after, t));
+            }
         }
         let (k, m) = (low + count, high - count);
         (z[k], z[m]) = z0.split();
         (z[k + 1], z[m - 1]) = z1.split();
     }
 
-    fn backward_both(&self, low: usize, high: usize, count: usize, z: &mut [DVec3]) {
+    fn backward_both<const TIED: bool>(&self, low: usize, high: usize, count: usize, z: &mut [DVec3], part: f64) {
         if count == 0 {
             return;
         }
@@ -326,8 +473,14 @@ impl System {
             let far = Mat2::pair(&self.after[k], &self.after[m - 2]).times(&z2);
             let near = Mat2::pair(&self.next[k], &self.next[m - 1]).times(&z1);
             let s = Vec2::load(z[k], z[m]);
+            let mut left = s.less(&far.times(&p.inv)).less(&near.times(&p.inv));
+            if TIED {
+                let link = self.links(i, k, m);
+                let t = (link.next.dot(&z1) + link.after.dot(&z2) + link.own.dot(&s) - link.right * part) * link.inv;
+                left = left.plus(&link.own.times(&p.inv), -t);
+            }
             z2 = z1;
-            z1 = p.upper(&s.less(&far.times(&p.inv)).less(&near.times(&p.inv)));
+            z1 = p.upper(&left);
             (z[k], z[m]) = z1.split();
         }
     }
@@ -339,9 +492,17 @@ impl System {
             let (px, pt) = (self.pivots[2 * i], self.pivots[2 * i + 1]);
             // Inverse of the pivot block [[dx, n], [n^T, dt]]: theta's own pivot is already the Schur complement.
             let tt = pt.solve_mat(&DMat3::IDENTITY);
-            let n = px.upper_mat(&scale_rows(&self.next[2 * i], px.inv));
+            let mut n = px.upper_mat(&scale_rows(&self.next[2 * i], px.inv));
+            let mut alone = px.solve_mat(&DMat3::IDENTITY);
+            let link = self.tie(2 * i, true).filter(|_| i + 1 < zone.end).map(|e| self.links[e]);
+            // A multiplier takes motions along it out of the particle's own inverse.
+            let along = link.map_or(DVec3::ZERO, |link| px.upper(link.own * px.inv));
+            if let Some(link) = link {
+                n += outer(along, link.next * link.inv);
+                alone -= outer(along, along * link.inv);
+            }
             let xt = -(n * tt);
-            let own = Block { xx: px.solve_mat(&DMat3::IDENTITY) - xt * n.transpose(), xt, tx: xt.transpose(), tt };
+            let own = Block { xx: alone - xt * n.transpose(), xt, tx: xt.transpose(), tt };
             if i + 1 == zone.end {
                 self.inverse[i] = own;
                 continue;
@@ -349,7 +510,10 @@ impl System {
             // theta_i = -(t1 x' + t2 theta'), x_i = -(n theta_i + m x').
             let t1 = pt.upper_mat(&scale_rows(&self.next[2 * i + 1], pt.inv));
             let t2 = pt.upper_mat(&scale_rows(&self.after[2 * i + 1], pt.inv));
-            let m = px.upper_mat(&scale_rows(&self.after[2 * i], px.inv));
+            let mut m = px.upper_mat(&scale_rows(&self.after[2 * i], px.inv));
+            if let Some(link) = link {
+                m += outer(along, link.after * link.inv);
+            }
             let k = Block { xx: m - n * t1, xt: -(n * t2), tx: t1, tt: t2 };
             self.inverse[i] = own.add(&k.mul(&self.inverse[i + 1]).mul(&k.transpose()));
             self.transfer[i] = k;
@@ -430,6 +594,12 @@ impl Mat2 {
         let [a, b, c] = &self.cols;
         Vec2 { x: a.x * v.x + b.x * v.y + c.x * v.z, y: a.y * v.x + b.y * v.y + c.y * v.z, z: a.z * v.x + b.z * v.y + c.z * v.z }
     }
+    /// `self + a b^T`.
+    #[inline(always)]
+    fn plus_product(&self, a: &Vec2, b: &Vec2) -> Mat2 {
+        let [x, y, z] = &self.cols;
+        Mat2 { cols: [x.plus(a, b.x), y.plus(a, b.y), z.plus(a, b.z)] }
+    }
     /// `self - w^T s`.
     #[inline(always)]
     fn less_product(&self, w: &Mat2, s: &Mat2) -> Mat2 {
@@ -444,6 +614,28 @@ impl Mat2 {
         let (xx, xy, xz) = (a.x - wx.dot(sx), a.y - wy.dot(sx), a.z - wz.dot(sx));
         let (yy, yz, zz) = (b.y - wy.dot(sy), b.z - wz.dot(sy), c.z - wz.dot(sz));
         Mat2 { cols: [Vec2 { x: xx, y: xy, z: xz }, Vec2 { x: xy, y: yy, z: yz }, Vec2 { x: xz, y: yz, z: zz }] }
+    }
+}
+
+/// Two multipliers in the lanes of one.
+struct Link2 {
+    own: Vec2,
+    next: Vec2,
+    after: Vec2,
+    inv: f64x2,
+    right: f64x2,
+}
+
+impl Link2 {
+    #[inline(always)]
+    fn join((low, l): &(Link, f64), (high, h): &(Link, f64)) -> Self {
+        Link2 {
+            own: Vec2::load(low.own, high.own),
+            next: Vec2::load(low.next, high.next),
+            after: Vec2::load(low.after, high.after),
+            inv: lanes(low.inv, high.inv),
+            right: lanes(*l, *h),
+        }
     }
 }
 
@@ -516,11 +708,11 @@ mod tests {
             for w in [1e5, 1.0, 1e-2, 1e-2, 3.0] {
                 let j: Vec<DVec3> = (0..3).map(|_| DVec3::new(rnd(), rnd(), rnd())).collect();
                 for a in 0..3 {
-                    s.diagonal[k + a] += crate::math::outer(j[a], j[a]) * w;
+                    s.diagonal[k + a] += outer(j[a], j[a]) * w;
                 }
-                s.next[k] += crate::math::outer(j[0], j[1]) * w;
-                s.next[k + 1] += crate::math::outer(j[1], j[2]) * w;
-                s.after[k] += crate::math::outer(j[0], j[2]) * w;
+                s.next[k] += outer(j[0], j[1]) * w;
+                s.next[k + 1] += outer(j[1], j[2]) * w;
+                s.after[k] += outer(j[0], j[2]) * w;
             }
         }
         s
@@ -566,11 +758,52 @@ mod tests {
         }
     }
 
+    /// Gives the elements multipliers, and puts what they come to into the matrix of the other.
+    fn tie(f: &mut System, condensed: &mut System, n: usize) {
+        for e in 0..n - 1 {
+            let x = e as f64;
+            let (a, b) = (DVec3::new(0.3 + 0.1 * x, -0.5, 0.2 * x), DVec3::new(-0.4, 0.6 - 0.1 * x, 0.3));
+            let give = 0.03 * (x + 1.0);
+            f.ties[e] = ([a, b], give);
+            condensed.diagonal[2 * e] += outer(a, a) / give;
+            condensed.diagonal[2 * e + 2] += outer(b, b) / give;
+            condensed.after[2 * e] += outer(a, b) / give;
+        }
+        f.tied.fill(true);
+    }
+
+    #[test]
+    fn multipliers_are_stiffnesses_in_the_matrix() {
+        let n = 11;
+        for lo in 0..n {
+            for hi in lo + 1..=n {
+                let (mut f, mut s) = (sample(n), sample(n));
+                tie(&mut f, &mut s, n);
+                assert!(f.factor(0..n, &(lo..hi)));
+                let want: Vec<DVec3> = (0..2 * n).map(|k| DVec3::new(k as f64, 1.0, -0.5 * k as f64)).collect();
+                let mut z = multiply(&s, &want);
+                f.solve(0..n, &(lo..hi), &mut z);
+                let err = z.iter().zip(&want).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+                // As without.
+                assert!(err < 1e-6, "zone {lo}..{hi}: {err:e}");
+            }
+        }
+    }
+
     #[test]
     fn zone_inverse_is_the_inverse() {
+        for tied in [false, true] {
+            compare_inverse(tied);
+        }
+    }
+
+    fn compare_inverse(tied: bool) {
         let n = 11;
         let zone = 2..6;
         let mut f = sample(n);
+        if tied {
+            tie(&mut f, &mut sample(n), n);
+        }
         f.factor(0..n, &zone);
         f.invert_zone(&zone);
         for j in zone.clone() {

@@ -281,7 +281,7 @@ fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
 /// Work of tensions over what lengths that are constraints may be off, and of contact forces over what they may overlap \[J\]: it comes and goes.
 fn slack<'a, I: Iterator<Item = &'a RodModel> + Clone>(model: &Model, state: &State, before: &State, rods: &impl Fn() -> I) -> f64 {
     let mut sum = 0.0;
-    for rod in rods().filter(|rod| rod.stretch == crate::Stretch::Inextensible) {
+    for rod in rods().filter(|rod| rod.stretch == Stretch::Inextensible) {
         for e in rod.elements() {
             sum += before.tension[e].abs().max(state.tension[e].abs()) * model.rest_length[e] * 2.0 * LENGTH_TOLERANCE;
         }

@@ -309,7 +309,9 @@ fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
     let solves = if settings.integrator == Integrator::TrBdf2 { 3 } else { 1 };
     // A thread that gives way costs an attempt a step, and after a reel has cut an element another one.
     let giving = world.view().rods().filter(|r| r.stretch() == Stretch::Inextensible).count() as f64;
-    let attempts = wanted * (f64::from((2u32 << settings.halvings) - 1) + giving);
+    // With each thread that is held the rest is tried anew.
+    let held = report.incidents.iter().filter(|i| matches!(i.kind, IncidentKind::Held { .. })).count() as f64;
+    let attempts = wanted * (f64::from((2u32 << settings.halvings) - 1) + giving) * (1.0 + held);
     if f64::from(report.substeps) + f64::from(report.rejected) > attempts
         || report.newton_iterations > solves * settings.newton_max * (report.substeps + report.rejected)
     {

@@ -635,9 +635,10 @@ fn switched_where_threads_touch_it_goes_on() {
         assert!(report.incidents.is_empty(), "{:?}", report.incidents);
     }
     println!("tension {tension} then {}, contacts {contacts} then {}", ends(&world), world.contacts().count());
-    // The paper's solver has stretched the thread by an eighth or more; where it comes back over the post, friction holds a part of the way, and the side that hangs
-    // is longer by it.
-    assert!((ends(&world) / tension - 1.0).abs() < 0.06, "{tension} {}", ends(&world));
+    // The paper's solver has stretched the thread by an eighth or more. It comes back over the post against friction, so where it stops is within what friction can
+    // hold, exp(mu pi), not where it was.
+    assert!((ends(&world) / tension).ln().abs() < 0.3 * PI, "{tension} {}", ends(&world));
+    assert!(world.rod(rod).unwrap().energy().kinetic < 1e-6 * world.rod(rod).unwrap().energy().bend.max(1e-9), "it rests");
     assert!(world.contacts().count() > contacts / 2);
     assert!(world.rod(rod).unwrap().max_elongation() < 1e-4);
 }

@@ -278,10 +278,12 @@ fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
         let (lo, hi) = (b.lo + keep, b.hi - keep);
         x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
     });
-    let pushed = model.shapes.iter().zip(&candidates.shape_bounds).filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. })).any(|((slot, shape), (lo, hi))| {
-        let (now_lo, now_hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
-        now_lo.cmplt(*lo).any() || now_hi.cmpgt(*hi).any()
-    });
+    let pushed = model.shapes.iter().zip(&candidates.shape_bounds).filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. })).any(
+        |((slot, shape), (lo, hi))| {
+            let (now_lo, now_hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
+            now_lo.cmplt(*lo).any() || now_hi.cmpgt(*hi).any()
+        },
+    );
     left || pushed || {
         // Both lanes the same: there is one centerline to look at.
         turning(model, [x, x], &mut candidates.turned);

@@ -45,7 +45,6 @@ pub(crate) struct Distance {
     pub normal: DVec3,
 }
 
-
 /// Walls of a mesh that a particle may touch at once.
 const WALLS: usize = 8;
 
@@ -318,7 +317,8 @@ impl Surface {
                     // No triangle at this corner may lean toward the point.
                     self.near(corner, corner, 0.0).all(|t| {
                         let [a, b, c] = self.mesh.indices()[t as usize];
-                        ![a, b, c].contains(&v) || [a, b, c].iter().all(|w| (from_parry(self.mesh.vertices()[*w as usize]) - corner).dot(normal) <= LEAN * (value + 1.0))
+                        ![a, b, c].contains(&v)
+                            || [a, b, c].iter().all(|w| (from_parry(self.mesh.vertices()[*w as usize]) - corner).dot(normal) <= LEAN * (value + 1.0))
                     })
                 }
                 _ => true,

@@ -360,7 +360,8 @@ fn inherit(old: &[ShapeContact], model: &Model, rows: &mut [ShapeRow]) {
         let place = f64::from(c.element) + c.s;
         let nearest = |rows: &[ShapeRow], reach: f64, facing: f64| {
             let far = |r: &ShapeRow| (r.place() - place).abs();
-            let there = |r: &ShapeRow| far(r) <= reach && model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
+            let there =
+                |r: &ShapeRow| far(r) <= reach && model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
             let found = rows.iter().enumerate().filter(|(_, r)| there(r)).min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
             found.map(|(k, _)| k)
         };

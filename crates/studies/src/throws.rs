@@ -133,7 +133,9 @@ impl Turnover {
         }
         let (own, potential) = energy(&scene, view);
         let (own_before, potential_before) = *self.start.get_or_insert((own, potential));
-        self.most = self.most.max(own).max((potential - potential_before).abs());
+        // What contact moves a resting thread by to keep its distance is no turnover.
+        let settles: f64 = view.rods().map(|r| r.mass_per_length(0) * r.rest_length() * 9.81 * r.radius()).sum();
+        self.most = self.most.max(own).max((potential - potential_before).abs()).max(settles);
         self.above = self.above.max(own + potential - own_before - potential_before);
     }
     fn gain(&self) -> f64 {

@@ -179,9 +179,9 @@ fn work_of_excess(model: &Model, state: &State, scratch: &Scratch, excess: impl 
 /// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds up.
 fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let built_up = |e: usize, change: DVec3| {
-        let (axial, at_rest) = scratch.axial(model, e);
-        let known = if model.is_tied(e) { axial * element_strain(model, state, e).z + at_rest - scratch.tension[e] } else { 0.0 };
-        (model.stretch_stiffness[e].truncate() * change.truncate()).extend(axial * change.z + known)
+        let axial = scratch.axial(model, e).0;
+        let known = if model.is_tied(e) { scratch.system.right[e] } else { 0.0 };
+        (model.stretch_stiffness[e].truncate() * change.truncate()).extend(axial * (change.z - known))
     };
     work(scratch) - work_of_excess(model, state, scratch, built_up)
 }
@@ -324,8 +324,7 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64, an
             }
             // The tension is an unknown of its own, of which as much is taken as of the others.
             if anew {
-                let (axial, at_rest) = scratch.axial(model, e);
-                scratch.tension_change[e] = (d.length() - model.rest_length[e] + change.z) * axial + at_rest - scratch.tension[e];
+                scratch.tension_change[e] = scratch.axial(model, e).0 * (change.z - scratch.system.right[e]);
             }
             scratch.tension[e] += scratch.tension_change[e] * scale;
         }

@@ -48,6 +48,7 @@ fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Sc
         inv_h: 1.0 / h,
         exact: hessian == Hessian::Exact,
         keeps_length: model.inextensible[rod.start],
+        welds: model.welds.iter().next().is_some(),
         given: false,
         last,
     };
@@ -69,7 +70,17 @@ fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Sc
 /// The residual and the Hessian without the clamps of the blocks `held` of a rod, with the tensions that are in `scratch`.
 pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &Range<usize>, held: Range<usize>) {
     let last = rod.end - 1;
-    let at = At::<true> { model, state, inv_h2: 1.0 / (h * h), inv_h: 1.0 / h, exact: false, keeps_length: model.inextensible[rod.start], given: true, last };
+    let at = At::<true> {
+        model,
+        state,
+        inv_h2: 1.0 / (h * h),
+        inv_h: 1.0 / h,
+        exact: false,
+        keeps_length: model.inextensible[rod.start],
+        welds: model.welds.iter().next().is_some(),
+        given: true,
+        last,
+    };
     let mut carry = if held.start > rod.start { at.carry(scratch, held.start - 1) } else { Carry::none() };
     for e in held {
         if e == last {
@@ -144,6 +155,8 @@ struct At<'a, const FLAT: bool> {
     exact: bool,
     /// Whether the rod is inextensible.
     keeps_length: bool,
+    /// Whether there are welds.
+    welds: bool,
     /// Whether the axial force is the tension that is given instead of that of the strain.
     given: bool,
     /// Last particle of the rod.
@@ -234,8 +247,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
         };
         let tension = lanes(t0, t1);
         // The elements at a weld have their stiffness in the matrix.
-        let tied = |e: usize| if model.is_tied(e) { 1.0 } else { 0.0 };
-        let tied = if self.keeps_length { lanes(tied(low), tied(high)) } else { f64x2::ZERO };
+        let is_tied = |e: usize| if !self.welds || model.is_tied(e) { 1.0 } else { 0.0 };
+        let tied = if self.keeps_length { lanes(is_tied(low), is_tied(high)) } else { f64x2::ZERO };
         let of_strain = c * (stretched - l) + lanes(p0, p1);
         let pull = if self.given { tension } else { of_strain + tied * (tension - of_strain) };
         let force = d.plus(&t, -along).scaled(a).plus(&line, pull);
@@ -263,7 +276,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         } else {
             (Sym2::scalar(a + g).square(&t, b - g), f64x2::ZERO)
         };
-        let off = tied * (tension - of_strain) / c;
+        let off = if self.keeps_length { (tension - of_strain) / c } else { f64x2::ZERO };
         Element { axis: t, force, torque: d.cross(&force), kx, kd, kt, line, give, off }
     }
 

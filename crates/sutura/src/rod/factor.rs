@@ -221,16 +221,19 @@ impl System {
 
     /// Factors the rod whose blocks are `blocks`; the zone must lie within. False when the matrix is not positive definite.
     pub fn factor(&mut self, blocks: Range<usize>, zone: &Range<usize>) -> bool {
-        let both = both(&blocks, zone);
+        let (both, top) = (both(&blocks, zone), self.top(&blocks, zone));
+        if top < 2 * blocks.end {
+            self.pivots[top] = Pivot::new(&self.diagonal[top]);
+        }
         if self.tied[blocks.start] {
-            self.eliminate_both::<true>(2 * blocks.start, 2 * blocks.end - 1, both);
+            self.eliminate_both::<true>(2 * blocks.start, top - 1, both);
         } else {
-            self.eliminate_both::<false>(2 * blocks.start, 2 * blocks.end - 1, both);
+            self.eliminate_both::<false>(2 * blocks.start, top - 1, both);
         }
         for k in 2 * blocks.start + both..2 * zone.start {
             self.eliminate_up(k);
         }
-        for k in (2 * zone.end..2 * blocks.end - both).rev() {
+        for k in (2 * zone.end..top - both).rev() {
             self.eliminate_down(k);
         }
         for k in 2 * zone.start..2 * zone.end - 2 {
@@ -245,6 +248,12 @@ impl System {
         self.pivots[k] = p;
         self.pivots[k + 1] = Pivot::new(&self.diagonal[k + 1]);
         self.pivots[2 * blocks.start..2 * blocks.end].iter().all(|p| p.inv.min_element() > 0.0)
+    }
+
+    /// End of the nodes that are eliminated downward. The last frame of a rod, which is no element's, couples to nothing: where there are multipliers it is
+    /// left out, so that the two ends come to their particles at the same time.
+    fn top(&self, blocks: &Range<usize>, zone: &Range<usize>) -> usize {
+        2 * blocks.end - usize::from(self.tied[blocks.start] && zone.end < blocks.end)
     }
 
     /// Eliminates `count` nodes from `low` on toward higher nodes and as many from `high` on toward lower ones, one of each at a time in the
@@ -268,28 +277,20 @@ impl System {
             d0 = d1.less_square(&w1, &s1);
             d1 = d2.less_square(&w2, &s2);
             n0 = n1.less_product(&w1, &s2);
-            if TIED {
-                // One of the two is a particle.
-                let none = ([DVec3::ZERO; 2], 1.0);
-                let (e, low, high) = if i % 2 == 0 {
-                    (k / 2, self.ties[k / 2], none)
-                } else {
-                    let ([a, b], give) = self.ties[m / 2 - 1];
-                    (m / 2 - 1, none, ([b, a], give))
-                };
-                let own = p.lower(&Vec2::load(low.0[0], high.0[0]));
+            if TIED && i.is_multiple_of(2) {
+                let (e, f) = (k / 2, m / 2 - 1);
+                let (([a, b], give), ([c, d], other)) = (self.ties[e], self.ties[f]);
+                let own = p.lower(&Vec2::load(a, d));
                 let s = own.times(&p.inv);
-                let inv = f64x2::splat(1.0) / (lanes(low.1, high.1) + own.dot(&s));
+                let inv = f64x2::splat(1.0) / (lanes(give, other) + own.dot(&s));
                 let zero = Vec2::load(DVec3::ZERO, DVec3::ZERO);
-                let (next, after) = (zero.less_t_vec(&w1, &s), Vec2::load(low.0[1], high.0[1]).less_t_vec(&w2, &s));
+                let (next, after) = (zero.less_t_vec(&w1, &s), Vec2::load(b, c).less_t_vec(&w2, &s));
                 d0 = d0.plus_product(&next, &next.scaled(inv));
                 n0 = n0.plus_product(&next, &after.scaled(inv));
                 d1 = d1.plus_product(&after, &after.scaled(inv));
-                let of = |lane: usize| {
-                    let pick = |v: &Vec2| if lane == 0 { v.split().0 } else { v.split().1 };
-                    Link { own: pick(&own), next: pick(&next), after: pick(&after), inv: inv.to_array()[lane] }
-                };
-                self.links[e] = of(i % 2);
+                let (own, next, after, inv) = (own.split(), next.split(), after.split(), inv.to_array());
+                self.links[e] = Link { own: own.0, next: next.0, after: after.0, inv: inv[0] };
+                self.links[f] = Link { own: own.1, next: next.1, after: after.1, inv: inv[1] };
             }
             w1.store(&mut self.next, k, m - 1);
             w2.store(&mut self.after, k, m - 2);
@@ -360,17 +361,21 @@ impl System {
 
     /// The same with a part of them.
     fn solve_part(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3], part: f64) {
-        let (first, last) = (2 * blocks.start, 2 * blocks.end);
+        let (first, top) = (2 * blocks.start, self.top(&blocks, zone));
+        if top < 2 * blocks.end {
+            let p = &self.pivots[top];
+            z[top] = p.upper(p.lower(z[top]) * p.inv);
+        }
         let (lo, hi) = (2 * zone.start, 2 * zone.end);
         let both = both(&blocks, zone);
         // Forward: y = l^-1 r, then what it leaves in the nodes it couples to.
         if self.tied[blocks.start] {
-            self.forward_both::<true>(first, last - 1, both, z, part);
+            self.forward_both::<true>(first, top - 1, both, z, part);
         } else {
-            self.forward_both::<false>(first, last - 1, both, z, part);
+            self.forward_both::<false>(first, top - 1, both, z, part);
         }
         self.forward_up(first + both..lo, z, part);
-        self.forward_down(hi..last - both, z, part);
+        self.forward_down(hi..top - both, z, part);
         self.forward_up(lo..hi - 2, z, part);
         let k = hi - 2;
         let p = &self.pivots[k];
@@ -385,15 +390,15 @@ impl System {
             let tied = self.tie(k, true).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k + 1], z[k + 2]));
             z[k] = p.upper(z[k] - (self.next[k] * z[k + 1] + self.after[k] * z[k + 2]) * p.inv - tied);
         }
-        for k in hi..last - both {
+        for k in hi..top - both {
             let p = &self.pivots[k];
             let tied = self.tie(k, false).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k - 1], z[k - 2]));
             z[k] = p.upper(z[k] - (self.next[k - 1] * z[k - 1] + self.after[k - 2] * z[k - 2]) * p.inv - tied);
         }
         if self.tied[blocks.start] {
-            self.backward_both::<true>(first, last - 1, both, z, part);
+            self.backward_both::<true>(first, top - 1, both, z, part);
         } else {
-            self.backward_both::<false>(first, last - 1, both, z, part);
+            self.backward_both::<false>(first, top - 1, both, z, part);
         }
     }
 
@@ -427,12 +432,11 @@ impl System {
         }
     }
 
-    /// The multiplier of step `i` of both ends, in the lane of the end that is at a particle.
+    /// The multipliers of both ends at particles `k` and `m`.
     #[inline(always)]
-    fn links(&self, i: usize, k: usize, m: usize) -> Link2 {
-        let none = (Link::default(), 0.0);
+    fn links(&self, k: usize, m: usize) -> Link2 {
         let of = |e: usize| (self.links[e], self.right[e]);
-        if i.is_multiple_of(2) { Link2::join(&of(k / 2), &none) } else { Link2::join(&none, &of(m / 2 - 1)) }
+        Link2::join(&of(k / 2), &of(m / 2 - 1))
     }
 
     fn forward_both<const TIED: bool>(&self, low: usize, high: usize, count: usize, z: &mut [DVec3], part: f64) {
@@ -448,8 +452,8 @@ impl System {
             (z[k], z[m]) = s.split();
             z0 = z1.less_t_vec(&Mat2::pair(&self.next[k], &self.next[m - 1]), &s);
             z1 = Vec2::load(z[k + 2], z[m - 2]).less_t_vec(&Mat2::pair(&self.after[k], &self.after[m - 2]), &s);
-            if TIED {
-                let link = self.links(i, k, m);
+            if TIED && i.is_multiple_of(2) {
+                let link = self.links(k, m);
                 let t = (link.right * part - link.own.dot(&s)) * link.inv;
                 (z0, z1) = (z0.plus(&link.next, t), z1.plus(&link.after, t));
             }
@@ -474,8 +478,8 @@ impl System {
             let near = Mat2::pair(&self.next[k], &self.next[m - 1]).times(&z1);
             let s = Vec2::load(z[k], z[m]);
             let mut left = s.less(&far.times(&p.inv)).less(&near.times(&p.inv));
-            if TIED {
-                let link = self.links(i, k, m);
+            if TIED && i.is_multiple_of(2) {
+                let link = self.links(k, m);
                 let t = (link.next.dot(&z1) + link.after.dot(&z2) + link.own.dot(&s) - link.right * part) * link.inv;
                 left = left.plus(&link.own.times(&p.inv), -t);
             }
@@ -770,6 +774,10 @@ mod tests {
             condensed.after[2 * e] += outer(a, b) / give;
         }
         f.tied.fill(true);
+        // The last frame is no element's.
+        for s in [f, condensed] {
+            (s.next[2 * n - 2], s.after[2 * n - 3]) = (DMat3::ZERO, DMat3::ZERO);
+        }
     }
 
     #[test]

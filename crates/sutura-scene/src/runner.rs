@@ -282,6 +282,7 @@ impl Runner {
             };
             cpu += clock.elapsed().saturating_sub(audited);
             report.add(&step);
+            report.wanted += piece;
             for incident in &step.incidents {
                 if let IncidentKind::Overlap(overlap) = &incident.kind {
                     let message = self.overlap(overlap);
@@ -404,10 +405,9 @@ impl Runner {
     /// Sums up a frame.
     fn take_note(&mut self, report: &FrameReport, cpu: f64) {
         self.cpu.push(cpu);
-        let frame = 1.0 / self.scene.frame_rate;
-        let missed = frame - report.simulated;
-        // Pieces of a frame add up to it but for rounding.
-        self.missed += if missed > 1e-9 * frame { missed } else { 0.0 };
+        let missed = report.wanted - report.simulated;
+        // Sums of the same pieces, but for rounding.
+        self.missed += if missed > 1e-9 * report.wanted { missed } else { 0.0 };
         let work = &mut self.work;
         work.substeps += u64::from(report.substeps);
         work.rejected += u64::from(report.rejected);

@@ -95,7 +95,8 @@ enum Growing {
 /// What the last frame's steps said together.
 #[derive(Debug, Clone, Default)]
 pub struct FrameReport {
-    /// Time that was simulated \[s\].
+    /// Time that was to be simulated, and that was \[s\].
+    pub wanted: f64,
     pub simulated: f64,
     pub substeps: u32,
     pub rejected: u32,

@@ -12,12 +12,13 @@
 //! order of the error of the method in a substep, so they leave its order. Contact forces have no energy here: what overlap gives back is taken off too.
 
 use crate::integrator::Method;
+use crate::math::Pose;
 use crate::model::Model;
 use crate::model::grip::{Drive, LoadKind};
 use crate::model::rod::{RodModel, Stretch};
 use crate::model::shape::ShapeMotion;
 use crate::newton::LENGTH_TOLERANCE;
-use crate::params::OVERLAP;
+use crate::params::{Integrator, OVERLAP};
 use crate::scratch::Scratch;
 use crate::state::State;
 use glam::{DMat3, DVec3};
@@ -44,11 +45,17 @@ const EDITED: f64 = 200.0 * LENGTH_TOLERANCE;
 /// Energy of a thread that is bent by next to nothing, over that at an angle of one from end to end: rounding of angles and lengths.
 const NOTHING: f64 = 1e-9;
 
+/// Way of a grip in a step, in radii, up to which it stands still.
+const STANDS: f64 = 1e-9;
+
 /// Threads that act on each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Group {
     /// Something that does not move holds it, or it touches that.
     held: bool,
+    /// A grip does; something touches it.
+    gripped: bool,
+    touched: bool,
     /// Something else does work on it.
     driven: bool,
     /// A torque does: it has no potential.
@@ -110,7 +117,9 @@ pub(crate) fn settle(model: &Model, state: &mut State, scratch: &mut Scratch, be
         if !group.held {
             keep_momentum(model, state, scratch, before, h, method, &rods);
         }
-        if !group.twisted {
+        // Implicit Euler is left alone where hands hold what touches something: contacts give back what they were pressed with.
+        let kept = !(group.gripped && model.settings.integrator == Integrator::ImplicitEuler);
+        if !group.twisted && kept {
             match keep_energy(model, state, scratch, before, group.held, last, &rods) {
                 Settled::Well => {}
                 _ if method != Method::Euler => settled = Settled::Coarse,
@@ -131,7 +140,7 @@ impl Budget {
         self.of.clear();
         self.of.extend(0..n as u32);
         self.groups.clear();
-        self.groups.resize(n, Group { held: false, driven: false, twisted: false });
+        self.groups.resize(n, Group { held: false, gripped: false, touched: false, driven: false, twisted: false });
         for c in before.thread_contacts.iter().chain(&state.thread_contacts) {
             self.join(model.rod_of[c.a as usize], model.rod_of[c.b as usize]);
         }
@@ -145,17 +154,22 @@ impl Budget {
         }
         for (_, grip) in state.grips.iter() {
             let group = &mut self.groups[self.of[grip.rod as usize] as usize];
-            group.held = true;
+            (group.held, group.gripped) = (true, true);
+            let rod = model.rods.at(grip.rod).expect("grips go with their rod");
             group.driven |= match grip.drive {
-                Drive::Pose => grip.pose != grip.target || before.time < grip.taken_at + grip.ramp,
+                Drive::Pose => moves(&grip.pose, &grip.target, rod.radius) || before.time < grip.taken_at + grip.ramp,
                 Drive::Force { force, .. } | Drive::Hand { force, .. } => force > 0.0,
             };
         }
         for (_, reel) in state.reels.iter() {
             self.groups[self.of[reel.rod as usize] as usize].driven = true;
         }
+        for c in before.thread_contacts.iter().chain(&state.thread_contacts) {
+            self.groups[self.of[model.rod_of[c.a as usize] as usize] as usize].touched = true;
+        }
         for c in before.shape_contacts.iter().chain(&state.shape_contacts) {
             let group = &mut self.groups[self.of[model.rod_of[c.element as usize] as usize] as usize];
+            group.touched = true;
             let k = c.shape as usize;
             let pushed = model.shapes.at(c.shape).is_some_and(|s| matches!(s.motion, ShapeMotion::Pushed { .. }));
             group.held = true;
@@ -378,6 +392,12 @@ impl Moments {
         turn
     }
 }
+/// Whether a grip is on its way from one pose to another, beyond rounding.
+fn moves(pose: &Pose, target: &Pose, radius: f64) -> bool {
+    let turned = pose.orientation.dot(target.orientation).abs();
+    (target.position - pose.position).length() > STANDS * radius || 1.0 - turned > STANDS
+}
+
 /// Largest |elongation| of an element whose length is a constraint.
 fn most_elongated(model: &Model, state: &State) -> f64 {
     let rods = model.rods.iter().filter(|(_, r)| r.stretch == Stretch::Inextensible);

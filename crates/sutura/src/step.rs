@@ -56,7 +56,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
         let held = scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
-        grip.pose = if whole && held.is_none() { grip.target } else { grip.pose.interpolate(&grip.target, held.unwrap_or(reached)) };
+        grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
     }
     report.simulated = reached * interval.length;
     state.time = interval.start + interval.length;

@@ -1,11 +1,20 @@
-//! A quick part of `studies throws`: ten throws of each family.
+//! A quick part of `studies throws`: some throws of each family.
 
 use sutura_generated::throw::{FAMILIES, numbered};
 use sutura_studies::throws::examine;
 
 #[test]
-#[ignore = "contact does not hold under all of them yet; `studies throws` counts what fails"]
-fn no_throw_passes_through_or_is_given_up() {
+fn no_throw_passes_through() {
+    for number in 0..4 * FAMILIES.len() as u64 {
+        let throw = numbered(1, number);
+        let seen = examine(&throw, 10.0, &mut |_| {});
+        assert_eq!(seen.passages, 0, "throw {number} ({}, {}): {:?}", throw.family.name(), throw.how.name(), seen.first_passage);
+    }
+}
+
+#[test]
+#[ignore = "some 3 in 100 throws end with an incident, mostly inextensible threads that give way; `studies throws` counts them"]
+fn no_throw_is_given_up() {
     let mut faults = Vec::new();
     for number in 0..10 * FAMILIES.len() as u64 {
         let throw = numbered(1, number);

@@ -201,7 +201,8 @@ tolerance = "0.03 mm"
 /// 1.326 times as much for mu = 0.2 (theory 11.3), a belt 1.369; it may stick below that.
 #[test]
 fn an_edge_is_drawn_over() {
-    holds(r#"
+    holds(
+        r#"
 [solver]
 linear_damping = 0.9
 [friction]
@@ -249,5 +250,6 @@ name = "let out"
 that = "-force(a).x"
 after = "let out"
 between = ["34 mN", "48 mN"]
-"#);
+"#,
+    );
 }

@@ -66,6 +66,7 @@ impl ThreadRow {
         let sum = ra.radius + rb.radius;
         let modulus = 1.0 / (1.0 / ra.material.contact_modulus() + 1.0 / rb.material.contact_modulus());
         let hertz = 4.0 / 3.0 * modulus * (ra.radius * rb.radius).sqrt().sqrt();
+        let light = params::LIGHT * sum;
         ThreadRow {
             a,
             b,
@@ -76,7 +77,7 @@ impl ThreadRow {
             sum: sum * (1.0 + params::KEEP),
             radii: [ra.radius, rb.radius],
             hertz,
-            least: hertz * (params::LIGHT * sum).powi(3).sqrt(),
+            least: hertz * light * light.sqrt(),
             entered: 0.0,
             mu: [f.stick, f.slide],
             sliding: false,

@@ -51,6 +51,9 @@ pub(crate) fn pressed_threads(scratch: &Scratch, a: usize, b: usize) -> f64 {
 
 /// How deep the contact forces at an element or its neighbors press it into a shape \[m\].
 pub(crate) fn pressed_shape(scratch: &Scratch, shape: u32, element: usize) -> f64 {
-    let near = |r: &&shape::ShapeRow| r.on().0 == shape && r.on().1.abs_diff(element) <= 1;
-    scratch.rows.shapes.iter().filter(near).map(shape::ShapeRow::depth).fold(0.0, f64::max)
+    // In the order of their places.
+    let rows = &scratch.rows.shapes;
+    let from = rows.partition_point(|r| r.on().1 + 1 < element);
+    let near = rows[from..].iter().take_while(|r| r.on().1 <= element + 1);
+    near.filter(|r| r.on().0 == shape).map(shape::ShapeRow::depth).fold(0.0, f64::max)
 }

@@ -646,8 +646,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let apart = if matches!(collider, Collider::Surface(_)) { APART } else { 0.7 };
         let mut pressed = None;
         let mut look = |s: f64, d: Distance| {
-            let pressed = *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e));
-            if d.value >= least - pressed {
+            if d.value >= least || d.value >= least - *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e)) {
                 return;
             }
             let at = |x: &[DVec3]| x[e].lerp(x[e + 1], s);

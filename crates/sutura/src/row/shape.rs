@@ -30,6 +30,7 @@ use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::row::pushed::Sliders;
 use crate::scratch::Scratch;
 use crate::state::{ShapeContact, State};
+use core::ops::Range;
 use glam::{DMat3, DVec3};
 
 /// A place on a thread that may touch a shape in this substep.
@@ -59,6 +60,8 @@ pub(crate) struct ShapeRow {
     /// Direction of the element, and, between its particles, that of the thread as a smooth curve.
     along: DVec3,
     smooth: Option<DVec3>,
+    /// At a particle whose foot is that of an edge row: see [`leave_to_edges`].
+    beside_edge: bool,
     /// Outward direction of the surface and gap at the last look.
     normal: DVec3,
     gap: f64,
@@ -225,6 +228,7 @@ impl Site<'_> {
             entered: 0.0,
             along: (self.start[e + 1] - self.start[e]).normalize_or_zero(),
             smooth,
+            beside_edge: false,
             normal: across(before.normal, smooth),
             gap,
             before,
@@ -331,26 +335,25 @@ fn leave_to_edges(rows: &mut Vec<ShapeRow>, start: &[DVec3]) {
         if r.s == 0.0 { start[e] } else { start[e].lerp(start[e + 1], r.s) }
     };
     let foot = |r: &ShapeRow| at(r) - r.before.normal * r.before.value;
-    let mut k = 0;
-    while k < rows.len() {
+    for k in 0..rows.len() {
         let row = rows[k];
+        if row.smooth.is_some() {
+            continue;
+        }
         let beside = |edge: &ShapeRow| {
             let way = (at(edge) - at(&row)).length();
-            edge.s > 0.0
-                && edge.s < 1.0
-                && edge.shape == row.shape
-                && (edge.place() - row.place()).abs() < 1.0
-                && edge.before.value < row.before.value
-                && way < 1.5 * row.radius
-                && (foot(edge) - foot(&row)).length() < 0.5 * way
+            let sharp = way < 1.5 * row.radius && (foot(edge) - foot(&row)).length() < 0.5 * way;
+            edge.smooth.is_some() && edge.before.value < row.before.value && sharp
         };
-        let near = rows[k.saturating_sub(2 * params::PLACES)..(k + 1 + 2 * params::PLACES).min(rows.len())].iter().any(beside);
-        if (row.s == 0.0 || row.s == 1.0) && near {
-            rows.remove(k);
-        } else {
-            k += 1;
-        }
+        let near = &rows[between(rows, row.shape, row.place() - 1.0, row.place() + 1.0)];
+        rows[k].beside_edge = near.iter().any(beside);
     }
+    rows.retain(|r| !r.beside_edge);
+}
+
+/// Rows on a shape whose places are within a range, of rows in the order of shapes and places.
+fn between(rows: &[ShapeRow], shape: u32, from: f64, to: f64) -> Range<usize> {
+    rows.partition_point(|r| r.key() < (shape, from))..rows.partition_point(|r| r.key() <= (shape, to))
 }
 
 /// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on another one in its place: the half of a
@@ -358,16 +361,12 @@ fn leave_to_edges(rows: &mut Vec<ShapeRow>, start: &[DVec3]) {
 fn inherit(old: &[ShapeContact], model: &Model, rows: &mut [ShapeRow]) {
     for c in old {
         let place = f64::from(c.element) + c.s;
-        let nearest = |rows: &[ShapeRow], reach: f64, facing: f64| {
-            let far = |r: &ShapeRow| (r.place() - place).abs();
-            let there =
-                |r: &ShapeRow| far(r) <= reach && model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
-            let found = rows.iter().enumerate().filter(|(_, r)| there(r)).min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)));
-            found.map(|(k, _)| k)
+        let nearest = |shape: u32, reach: f64, facing: f64| {
+            let far = |k: &usize| (rows[*k].place() - place).abs();
+            let there = |r: &ShapeRow| model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
+            between(rows, shape, place - reach, place + reach).filter(|k| there(&rows[*k])).min_by(|a, b| far(a).total_cmp(&far(b)))
         };
-        let from = rows.partition_point(|r| r.key() < (c.shape, place - 0.3));
-        let to = rows.partition_point(|r| r.key() <= (c.shape, place + 0.3));
-        let found = nearest(&rows[from..to], 0.3, 0.5).map(|k| from + k).or_else(|| nearest(rows, 1e-9, 0.9999));
+        let found = nearest(c.shape, 0.3, 0.5).or_else(|| model.shapes.iter().find_map(|(other, _)| nearest(other, 1e-9, 0.9999)));
         if let Some(k) = found {
             rows[k].receive(c);
         }

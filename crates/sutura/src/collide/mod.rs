@@ -251,7 +251,7 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed
         let below = r * (1.0 - 2.0 * params::OVERLAP);
         if first.value.min(second.value) - 0.5 * (to[1] - to[0]).length() < below {
             let mut verdict = Ok(());
-            collider.least_between(to, below, |s, d| {
+            collider.least_between(to, [first, second], below, |s, d| {
                 if verdict.is_ok() {
                     verdict = judge(s, d.value);
                 }

@@ -54,6 +54,12 @@ const LEAN: f64 = 1e-6;
 /// Cosine up to which two nearest places of a mesh count as on different walls: two facets with a hollow edge between them are.
 pub(crate) const APART: f64 = 0.9999;
 
+/// Places that are looked at for the least distance of a segment from a convex solid.
+const SEARCH: u32 = 24;
+
+/// How near to the least distance such a place comes, over the length of the segment.
+const PRECISE: f64 = 1e-6;
+
 /// Our body axes to parry's and back.
 fn to_parry(p: DVec3) -> DVec3 {
     DVec3::new(p.x, p.z, -p.y)
@@ -129,27 +135,27 @@ impl Collider {
     }
 
     /// Places in (0, 1) on the segment (body frame) where its distance is least, as far as they are nearer than `below`, with their distances. Of a convex solid
-    /// there is one at most. Of a mesh they lie on edges, and where the segment passes through it.
-    pub fn least_between(&self, [a, b]: [DVec3; 2], below: f64, mut found: impl FnMut(f64, Distance)) {
+    /// there is one at most. Of a mesh they lie on edges, and where the segment passes through it. `known` are the distances of its ends.
+    pub fn least_between(&self, ends: [DVec3; 2], known: [Distance; 2], below: f64, mut found: impl FnMut(f64, Distance)) {
         match self {
             // Greatest and least are at the ends.
             Collider::Plane => {}
             Collider::Solid(_) => {
-                let (s, d) = self.least_of_convex(a, b);
-                if s > 0.0 && s < 1.0 && d.value < below {
+                if let Some((s, d)) = self.least_of_convex(ends, known, below) {
                     found(s, d);
                 }
             }
-            Collider::Surface(surface) => surface.least_on_edges([a, b], below, &mut found),
+            Collider::Surface(surface) => surface.least_on_edges(ends, below, &mut found),
         }
     }
 
     /// Least distance of the segment (body frame) from the shape, zero or less where they meet, and a place where it is; nothing beyond `below`.
     pub fn segment_distance(&self, [a, b]: [DVec3; 2], below: f64) -> Option<(f64, f64)> {
-        let (first, last) = (self.distance_local(a).value, self.distance_local(b).value);
+        let known = [self.distance_local(a), self.distance_local(b)];
+        let [first, last] = known.map(|d| d.value);
         let mut least = if first <= last { (0.0, first) } else { (1.0, last) };
         if least.1 - 0.5 * (b - a).length() < below {
-            self.least_between([a, b], below, |s, d| {
+            self.least_between([a, b], known, below, |s, d| {
                 if d.value < least.1 {
                     least = (s, d.value);
                 }
@@ -158,38 +164,38 @@ impl Collider {
         (least.1 < below).then_some(least)
     }
 
-    /// Place in \[0, 1\] on the segment where the distance, convex along it, is least: where tangents from both sides meet, again and again.
-    fn least_of_convex(&self, a: DVec3, b: DVec3) -> (f64, Distance) {
+    /// Place in (0, 1) on the segment where the distance, convex along it, is least, where that is less than `below`. Tangents at both sides bound it from below. The
+    /// next place to look at is where the slope would vanish if it changed evenly, which is so on a smooth surface, and where the tangents meet, which
+    /// is so at an edge, in turn.
+    fn least_of_convex(&self, [a, b]: [DVec3; 2], known: [Distance; 2], below: f64) -> Option<(f64, Distance)> {
         let along = b - a;
-        let at = |s: f64| {
-            let d = self.distance_local(a.lerp(b, s));
-            (s, d, d.normal.dot(along))
-        };
-        let (mut lo, mut hi) = (at(0.0), at(1.0));
-        if lo.2 >= 0.0 {
-            return (lo.0, lo.1);
+        let side = |s: f64, d: Distance| (s, d, d.normal.dot(along));
+        let (mut lo, mut hi) = (side(0.0, known[0]), side(1.0, known[1]));
+        // NaN, in the very middle of a ball, is no direction either.
+        if !(lo.2 < 0.0 && hi.2 > 0.0) {
+            return None;
         }
-        if hi.2 <= 0.0 {
-            return (hi.0, hi.1);
-        }
-        for _ in 0..24 {
-            // Near a smooth minimum the two tangents meet near one end; the middle then does better.
-            let by_tangents = lo.0 + ((hi.1.value - lo.1.value) - hi.2 * (hi.0 - lo.0)) / (lo.2 - hi.2);
-            let (width, middle) = (hi.0 - lo.0, 0.5 * (lo.0 + hi.0));
-            let s = if (by_tangents - middle).abs() < 0.4 * width { by_tangents } else { middle };
-            let bound = lo.1.value + lo.2 * (by_tangents - lo.0);
-            let now = at(s);
+        for k in 0..SEARCH {
+            let width = hi.0 - lo.0;
+            let meet = lo.0 + ((hi.1.value - lo.1.value) - hi.2 * width) / (lo.2 - hi.2);
+            let bound = lo.1.value + lo.2 * (meet - lo.0);
+            if bound >= below {
+                return None;
+            }
+            if lo.1.value.min(hi.1.value) - bound <= PRECISE * along.length() {
+                break;
+            }
+            let even = lo.0 + width * lo.2 / (lo.2 - hi.2);
+            let s = if k % 2 == 0 { even } else { meet }.clamp(lo.0 + 0.02 * width, hi.0 - 0.02 * width);
+            let now = side(s, self.distance_local(a.lerp(b, s)));
             if now.2 < 0.0 {
                 lo = now;
             } else {
                 hi = now;
             }
-            let best = lo.1.value.min(hi.1.value);
-            if best - bound <= 1e-9 * along.length() || hi.0 - lo.0 < 1e-6 {
-                break;
-            }
         }
-        if lo.1.value < hi.1.value { (lo.0, lo.1) } else { (hi.0, hi.1) }
+        let (s, d, _) = if lo.1.value < hi.1.value { lo } else { hi };
+        (s > 0.0 && s < 1.0 && d.value < below).then_some((s, d))
     }
 
     /// World box that holds the shape.
@@ -403,7 +409,7 @@ mod tests {
 
     fn least(c: &Collider, ends: [DVec3; 2], below: f64) -> Vec<(f64, f64)> {
         let mut all = Vec::new();
-        c.least_between(ends, below, |s, d| all.push((s, d.value)));
+        c.least_between(ends, ends.map(|p| c.distance_local(p)), below, |s, d| all.push((s, d.value)));
         all.sort_by(|x, y| x.0.total_cmp(&y.0));
         all
     }

@@ -301,9 +301,14 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
             }
         };
         let below = d0.min(d1) - SHARP_BULGE * radius;
-        for (pose, x) in [(pose, x.as_slice()), (start_pose, start.as_slice())] {
-            let local = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
-            shape.collider.least_between(local, below, |s, d| between(s, d.value));
+        // As things are, and where velocity leads if that is elsewhere.
+        let seen = |pose: &Pose, x: &[DVec3]| [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
+        let (local, next) = (seen(start_pose, start), seen(pose, x));
+        let body = |d: Distance| Distance { normal: start_pose.orientation.conjugate() * d.normal, ..d };
+        shape.collider.least_between(local, [body(first.0), body(second.0)], below, |s, d| between(s, d.value));
+        let moved = (next[0] - local[0]).length_squared().max((next[1] - local[1]).length_squared());
+        if moved > (params::SAME_ROW * radius).powi(2) {
+            shape.collider.least_between(next, next.map(|p| shape.collider.distance_local(p)), below, |s, d| between(s, d.value));
         }
         for s in &places[..count] {
             let (before, now) = site.look(*s);
@@ -676,7 +681,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         if !model.is_element(e + 1) {
             look(1.0, ends[1]);
         }
-        collider.least_between(local, least.min(ends[0].value.min(ends[1].value) - SHARP_BULGE * r), |s, d| {
+        collider.least_between(local, ends, least.min(ends[0].value.min(ends[1].value) - SHARP_BULGE * r), |s, d| {
             if bulges(ends.map(|d| d.value), s, d.value, length, r) {
                 look(s, d);
             }

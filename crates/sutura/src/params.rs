@@ -211,6 +211,8 @@ pub(crate) const PLACES: usize = 4;
 pub(crate) const SAME_EDGE: f64 = 0.3;
 /// How far from a row along the thread another one is set up within a substep, in radii.
 pub(crate) const SAME_ROW: f64 = 0.1;
+/// Cosine between the normals of two contacts from which on they may be on one patch.
+pub(crate) const SAME_PATCH: f64 = 0.9;
 /// Part of an old overlap that may remain after a substep.
 pub(crate) const RECOVER: f64 = 0.8;
 /// Part of the depth to which its force presses a contact that it may lie deeper, to count half as one that overlaps.

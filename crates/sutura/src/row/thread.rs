@@ -12,7 +12,7 @@
 //!
 //! [`couple`]: crate::row::couple
 
-use crate::collide::{relative_motion, segment};
+use crate::collide::{Candidates, relative_motion, segment};
 use crate::math::log;
 use crate::model::Model;
 use crate::params;
@@ -39,6 +39,8 @@ pub(crate) struct ThreadRow {
     /// Normal force over depth^(3/2) \[N/m^(3/2)\] (Hertz), and the least force whose secant is taken \[N\].
     hertz: f64,
     least: f64,
+    /// How many rows bear on the same patch, itself among them, were their forces equal.
+    parts: f64,
     /// Compliance with which it last entered the small problem \[m/N\].
     entered: f64,
     mu: [f64; 2],
@@ -78,6 +80,7 @@ impl ThreadRow {
             radii: [ra.radius, rb.radius],
             hertz,
             least: hertz * light * light.sqrt(),
+            parts: 1.0,
             entered: 0.0,
             mu: [f.stick, f.slide],
             sliding: false,
@@ -181,7 +184,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
             if apart.length_squared() > room * room {
                 continue;
             }
-            if leans(model, start, b, *t, apart) || leans(model, start, a, *s, -apart) {
+            if leans(model, candidates, start, b, *t, a, apart) || leans(model, candidates, start, a, *s, b, -apart) {
                 continue;
             }
             let known = nearest_known(old, a, b, *s, *t);
@@ -201,6 +204,39 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     }
     merge(&mut rows.threads);
     inherit(old, &mut rows.threads);
+    share(&mut rows.threads, start);
+}
+
+/// Rows that bear on one another's patch bear together what one would: a thread that crosses another one at a joint of it lies in a notch, between two of them, and
+/// short elements along each other have several. Hertz' law is that of the patch, so each has its part of it.
+fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
+    let at = |e: usize, s: f64| start[e].lerp(start[e + 1], s);
+    for k in 0..rows.len() {
+        let row = rows[k];
+        if row.force.x <= 0.0 {
+            continue;
+        }
+        let patch = row.radii[0].min(row.radii[1]);
+        // In the order of places on the first thread; the patch is at most some elements long.
+        let reach = patch / start[row.a].distance(start[row.a + 1]) + 1.0;
+        let from = rows.partition_point(|r| r.place().0 < row.place().0 - reach);
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for r in rows[from..].iter().take_while(|r| r.place().0 <= row.place().0 + reach) {
+            let apart = (at(r.a, r.s) - at(row.a, row.s)).length_squared().max((at(r.b, r.t) - at(row.b, row.t)).length_squared());
+            if apart < patch * patch && r.axes[0].dot(row.axes[0]) > params::SAME_PATCH {
+                let near = 1.0 - apart / (patch * patch);
+                sum += near * r.force.x;
+                squares += near * r.force.x * r.force.x;
+            }
+        }
+        // As many equal forces as there are: 1 where one bears nearly all of it.
+        rows[k].parts = sum * sum / squares;
+    }
+    for row in rows.iter_mut().filter(|r| r.parts > 1.0) {
+        row.hertz /= row.parts;
+        row.least /= row.parts;
+        row.carried = row.depth();
+    }
 }
 
 /// Where two pieces are taken to touch: where they last did, as long as that is about as near as their closest places `c`. (Within both pieces the
@@ -215,15 +251,17 @@ fn keep_place(old: &[ThreadContact], start: &[DVec3], a: usize, b: usize, c: &se
     (c.s + (k.s - c.s) * part, c.t + (k.t - c.t) * part)
 }
 
-/// Whether what is touched at the place `s` of element `e`, `apart` from there, lies over the neighboring element, which has its own row. A row's
-/// plane is fixed over the substep: one that leans toward what slides along the thread is a wall at half of the way to the joint.
-fn leans(model: &Model, start: &[DVec3], e: usize, s: f64, apart: DVec3) -> bool {
-    let neighbor = match s {
-        0.0 if e > 0 && model.is_element(e - 1) => start[e - 1] - start[e],
-        1.0 if model.is_element(e + 1) => start[e + 2] - start[e + 1],
+/// Whether the element `other`, which is touched at the place `s` of element `e`, `apart` from there, lies over the neighbor of `e`, which has its own
+/// row. A row's plane is fixed over the substep: one that leans toward what slides along the thread is a wall at half of the way to the joint. Of a
+/// thread that folds back over itself the neighbor may be one that cannot touch: only a pair among the candidates has a row.
+fn leans(model: &Model, candidates: &Candidates, x: &[DVec3], e: usize, s: f64, other: usize, apart: DVec3) -> bool {
+    let (neighbor, along) = match s {
+        0.0 if e > 0 && model.is_element(e - 1) => (e - 1, x[e - 1] - x[e]),
+        1.0 if model.is_element(e + 1) => (e + 1, x[e + 2] - x[e + 1]),
         _ => return false,
     };
-    (1e-6..1.0).contains(&(apart.dot(neighbor) / neighbor.length_squared()))
+    let pair = (neighbor.min(other) as u32, neighbor.max(other) as u32);
+    (1e-6..1.0).contains(&(apart.dot(along) / along.length_squared())) && candidates.threads.binary_search(&pair).is_ok()
 }
 
 /// The last contact on the same pair of elements that is nearest in place.
@@ -347,6 +385,9 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]);
         let d0 = before.apart.length();
         if d > d0 - 1e-3 * sum && d0 < sum * (1.0 + params::KEEP) {
+            continue;
+        }
+        if leans(model, candidates, x, b, now.t, a, now.apart) || leans(model, candidates, x, a, now.s, b, -now.apart) {
             continue;
         }
         // The side that it came from.

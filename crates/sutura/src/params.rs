@@ -226,7 +226,7 @@ pub(crate) const FRONT: u32 = 3;
 /// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less evens out forces
 /// between contacts that together hold.
 pub(crate) const SLIP: f64 = 1e-3;
-/// Multiplications that a contact solve may spend; large ones get a tenth of the cube of their unknowns, six tenths of a factorization. (One that is cut short
+/// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two factorizations. (One that is cut short
 /// has friction that does not hold yet: in a rope of threads that feeds itself from substep to substep.)
 pub(crate) const CONTACT_WORK: f64 = 3e6;
 /// Work that a substep with all its halves may take, in rough counts of multiplications, so a minute or so. No sample scene reaches it. What takes more will not come to an end in any time worth waiting for: the world counts as stuck.

@@ -26,37 +26,33 @@ pub(crate) enum Source {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Endpoint {
     pub element: usize,
-    /// Columns on (x, theta) of block `element`, and on x of the next.
-    pub here: Columns,
+    /// Columns on the positions of its two particles.
+    pub here: DMat3,
     pub next: DMat3,
 }
 
 impl Endpoint {
-    /// The place `s` on `element`, pushed along `axes`: the normal at the centerline, the tangents at the surface, `arm` away from it. Friction
-    /// does not turn a thread about its own direction `along`.
-    pub fn new(element: usize, s: f64, axes: [DVec3; 3], arm: DVec3, along: DVec3) -> Self {
-        let across = |v: DVec3| v - along * along.dot(v);
-        let turn = DMat3::from_cols(DVec3::ZERO, across(arm.cross(axes[1])), across(arm.cross(axes[2])));
+    /// The place `s` of the centerline of `element`, pushed along `axes`.
+    pub fn new(element: usize, s: f64, axes: [DVec3; 3]) -> Self {
         let axes = DMat3::from_cols(axes[0], axes[1], axes[2]);
-        Endpoint { element, here: Columns { x: axes * (1.0 - s), t: turn }, next: axes * s }
+        Endpoint { element, here: axes * (1.0 - s), next: axes * s }
     }
 
     /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
     fn restricted(&self, freedom: &[Freedom]) -> Self {
         let keep = |node: usize, columns: DMat3| if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns };
-        let (x, t) = (2 * self.element, 2 * self.element + 1);
-        Endpoint { here: Columns { x: keep(x, self.here.x), t: keep(t, self.here.t) }, next: keep(x + 2, self.next), ..*self }
+        let x = 2 * self.element;
+        Endpoint { here: keep(x, self.here), next: keep(x + 2, self.next), ..*self }
     }
 
     fn push(&self, force: DVec3, right: &mut [DVec3]) {
-        right[2 * self.element] += self.here.x * force;
-        right[2 * self.element + 1] += self.here.t * force;
+        right[2 * self.element] += self.here * force;
         right[2 * self.element + 2] += self.next * force;
     }
 
     fn work(&self, force: DVec3, step: &[DVec3]) -> f64 {
         let k = 2 * self.element;
-        (self.here.x * force).dot(step[k]) + (self.here.t * force).dot(step[k + 1]) + (self.next * force).dot(step[k + 2])
+        (self.here * force).dot(step[k]) + (self.next * force).dot(step[k + 2])
     }
 }
 
@@ -148,8 +144,8 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let Scratch { rods, rows, system, step, freedom, start, start_frame, start_shape_pose, work, .. } = scratch;
-    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let Scratch { rods, rows, system, step, freedom, start, start_shape_pose, work, .. } = scratch;
+    let start = Start { position: start, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
     entries.clear();
     thread::enter(state, &start, step, &mut rows.threads, entries);
@@ -169,7 +165,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     }
     let n = b.len();
     // Putting S together, and the most that its solution may take.
-    *work += 30.0 * (n * n) as f64 + params::CONTACT_WORK.max((n * n * n) as f64 / 10.0);
+    *work += 30.0 * (n * n) as f64 + params::CONTACT_WORK.max((n * n * n) as f64 / 3.0);
     if *work > params::SUBSTEP_WORK {
         *left = f64::INFINITY;
         entries.clear();
@@ -240,7 +236,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             }
         }
     }
-    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK.max((n * n * n) as f64 / 10.0) };
+    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
     *left = cone.solve(s, b, mu, force, &limits) / smallest;
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
@@ -301,12 +297,13 @@ fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], j
         // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
         let (e, q_at) = (q.at.element, &q.at);
         let (x_here, x_next, k) = (system.inverse(e), system.inverse(e + 1), system.transfer(e));
-        let kt = k.transpose().mul_columns(&q_at.here);
+        let columns = |x: DMat3| Columns { x, t: DMat3::ZERO };
+        let kt = k.transpose().mul_columns(&columns(q_at.here));
         let pushed = Columns { x: q_at.next - kt.x, t: -kt.t };
         let mut next = x_next.mul_columns(&pushed);
-        let direct = x_next.mul_columns(&Columns { x: q_at.next, t: DMat3::ZERO });
+        let direct = x_next.mul_columns(&columns(q_at.next));
         let up = k.mul_columns(&direct);
-        let own = x_here.mul_columns(&q_at.here);
+        let own = x_here.mul_columns(&columns(q_at.here));
         let mut here = Columns { x: own.x - up.x, t: own.t - up.t };
         let mut at = blocks.partition_point(|b| *b < e);
         let mut pi = qi + 1;
@@ -319,7 +316,7 @@ fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], j
                 next = here;
                 here = jumps[at + 1].mul_columns(&here);
             }
-            let value = p.at.here.x.transpose() * here.x + p.at.here.t.transpose() * here.t + p.at.next.transpose() * next.x;
+            let value = p.at.here.transpose() * here.x + p.at.next.transpose() * next.x;
             let (r, c) = (3 * p.entry as usize, 3 * q.entry as usize);
             for j in 0..3 {
                 for i in 0..3 {

@@ -12,12 +12,11 @@ pub(crate) mod weld;
 
 use crate::math::Pose;
 use crate::scratch::Scratch;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 /// Where things were at the start of the substep.
 pub(crate) struct Start<'a> {
     pub position: &'a [DVec3],
-    pub frame: &'a [DQuat],
     pub shape: &'a [Pose],
 }
 

@@ -50,15 +50,13 @@ impl Sliders {
         }
     }
 
-    /// Adds a contact of the shape with the element `e`: stiffness, force on the thread, weights of its particles and turn of its frame.
-    #[allow(clippy::too_many_arguments, reason = "a contact has that many parts")]
-    pub fn add(&self, shape: u32, e: usize, stiffness: &DMat3, force: DVec3, weights: [f64; 2], turn: &DMat3, border: &mut Border) {
+    /// Adds a contact of the shape with the element `e`: stiffness, force on the thread and weights of its particles.
+    pub fn add(&self, shape: u32, e: usize, stiffness: &DMat3, force: DVec3, weights: [f64; 2], border: &mut Border) {
         let Some(k) = self.find(shape) else { return };
         let direction = self.direction(k);
         let pull = *stiffness * direction;
         border.link(k, 2 * e, -pull * weights[0]);
         border.link(k, 2 * e + 2, -pull * weights[1]);
-        border.link(k, 2 * e + 1, -(turn.transpose() * pull));
         border.add_own(k, k, direction.dot(pull));
         border.push(k, -direction.dot(force));
     }

@@ -7,8 +7,8 @@
 //! at once; Newton alone would switch them on and off from one iteration to the next.
 //!
 //! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
-//! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. It acts at the
-//! surface, with its arm on the frame, but does not turn a thread about its own direction; the normal force acts at the centerline.
+//! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. Both forces act
+//! at the centerline.
 //! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active set): one that slides and
 //! is pushed back against its friction has stopped. Going by the trial force alone it would slide the other way then, and to and fro,
 //! since the spring is 10^4 times and more stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
@@ -20,7 +20,7 @@
 //! [`couple`]: crate::row::couple
 
 use crate::collide::{APART, Collider, Distance};
-use crate::math::{Pose, log, outer, skew};
+use crate::math::{Pose, outer};
 use crate::model::shape::ShapeMotion;
 use crate::model::{Model, ShapeModel};
 use crate::params;
@@ -78,6 +78,8 @@ pub(crate) struct ShapeRow {
     /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
     mode: Mode,
+    /// How often it slid and stopped in this substep.
+    stops: u32,
     /// Stiffness of a firm row as last assembled, and the force that the step after it predicted.
     tangent: DMat3,
     expected: DVec3,
@@ -92,6 +94,9 @@ enum Mode {
 
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
+
+/// How often a firm row may slide and stop in a substep.
+const RESTLESS: u32 = 1;
 
 /// How much nearer than its ends a place within an element is that has a row of its own, in radii; and over an edge sharper than the thread.
 const BULGE: f64 = 0.08;
@@ -238,6 +243,7 @@ impl Site<'_> {
             normal_force: 0.0,
             friction: DVec3::ZERO,
             mode: Mode::Sticks,
+            stops: 0,
             pressed: 0.0,
             tangent: DMat3::ZERO,
             expected: DVec3::ZERO,
@@ -417,15 +423,12 @@ fn look(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow) -> 
     p
 }
 
-/// Slip of the thread's surface against the shape's since the start of the substep, with what was still to be undone then.
+/// Slip of the thread against the shape's surface since the start of the substep, with what was still to be undone then.
 fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
-    let arm = n * -row.radius;
-    let turned = log(state.orientation[e] * start.frame[e].conjugate());
-    let turned = turned - row.along * row.along.dot(turned);
-    let carried = surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p + arm);
-    let slip = p - start.position[e].lerp(start.position[e + 1], row.s) + turned.cross(arm) - carried + row.drift;
+    let carried = surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p - n * row.radius);
+    let slip = p - start.position[e].lerp(start.position[e + 1], row.s) - carried + row.drift;
     slip - n * n.dot(slip)
 }
 
@@ -451,11 +454,13 @@ fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, fi
 /// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has stopped.
 fn decide(row: &mut ShapeRow, trial: DVec3) {
     let (size, limit) = (trial.length(), row.mu() * row.pressed);
+    let before = row.mode;
     row.mode = match row.mode {
         Mode::Sticks if size > limit => Mode::Slides(trial / size),
         Mode::Slides(d) if size > limit && trial.dot(d) > 0.0 => Mode::Slides(trial / size),
         _ => Mode::Sticks,
     };
+    row.stops += u32::from(row.mode == Mode::Sticks && before != Mode::Sticks);
 }
 
 /// Friction force of a firm row at the iterate, and stiffness of all its forces against moves of the surface point.
@@ -480,13 +485,14 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
 
 /// Decides which firm rows slide, and takes those whose law is far from their linearization out of the rods' matrix.
 pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
-    let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
-    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let Scratch { rows, start, start_shape_pose, .. } = scratch;
+    let start = Start { position: start, shape: start_shape_pose };
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
         let trial = press(model, state, &start, row, first);
-        // Much deeper than its force says, its law is far from the parabola's tangent.
-        if row.gap < -3.0 * (row.carried / row.hardness).sqrt() || row.normal_force <= 0.0 && !first {
+        // Much deeper than its force says, its law is far from the parabola's tangent. One that slides and stops by turns may do so with
+        // another one for ever: the small problem decides all of them at once.
+        if row.gap < -3.0 * (row.carried / row.hardness).sqrt() || row.normal_force <= 0.0 && !first || row.stops > RESTLESS {
             *row = ShapeRow { firm: false, ..before };
         } else {
             decide(row, trial);
@@ -496,10 +502,10 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
 
 /// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
-    let Scratch { rows, system, rhs, start, start_frame, start_shape_pose, .. } = scratch;
+    let Scratch { rows, system, rhs, start, start_shape_pose, .. } = scratch;
     rows.border.clear(rows.sliders.count() + rows.welds.count());
     rows.sliders.assemble(model, state, start_shape_pose, &mut rows.border);
-    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let start = Start { position: start, shape: start_shape_pose };
     for row in &mut rows.shapes {
         if !row.firm {
             look(model, state, &start, row);
@@ -508,31 +514,22 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, firs
         let trial = press(model, state, &start, row, first);
         let stiffness = forces(row, trial);
         let e = row.element as usize;
-        let arm = row.normal * -row.radius;
         let (a, b) = (1.0 - row.s, row.s);
         let force = row.normal * row.normal_force + row.friction;
         rhs[2 * e] += force * a;
         rhs[2 * e + 2] += force * b;
-        let across = DMat3::IDENTITY - outer(row.along, row.along);
-        rhs[2 * e + 1] += across * arm.cross(row.friction);
-        let turn = skew(-arm) * across;
-        let kt = stiffness * turn;
         system.diagonal[2 * e] += stiffness * (a * a);
         system.diagonal[2 * e + 2] += stiffness * (b * b);
         system.after[2 * e] += stiffness * (a * b);
-        system.next[2 * e] += kt * a;
-        system.next[2 * e + 1] += kt.transpose() * b;
-        system.diagonal[2 * e + 1] += turn.transpose() * kt;
-        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &turn, &mut rows.border);
+        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &mut rows.border);
         row.tangent = stiffness;
     }
 }
 
-/// Move of a row's surface point against its shape along the last step.
+/// Move of a row's place against its shape along the last step.
 fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders, border: &Border) -> DVec3 {
     let e = row.element as usize;
-    let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
-    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s + turned.cross(row.normal * -row.radius) - sliders.moved(row.shape, border)
+    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - sliders.moved(row.shape, border)
 }
 
 /// Notes the forces that a step of this length predicts for the firm rows.
@@ -566,11 +563,9 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         row.entered = row.compliance();
         let axes = row.axes();
         let [n, t1, t2] = axes;
-        let arm = n * -row.radius;
-        let turned = step[2 * e + 1] - row.along * row.along.dot(step[2 * e + 1]);
-        let slip = slip(state, start, row) + moved + turned.cross(arm) - row.anchor * row.entered;
+        let slip = slip(state, start, row) + moved - row.anchor * row.entered;
         let (allowed, normal) = regain(row.start_gap, (row.carried / row.hardness).sqrt(), row.entered);
-        let end = Endpoint::new(e, row.s, axes, arm, row.along);
+        let end = Endpoint::new(e, row.s, axes);
         entries.push(Entry {
             source: Source::Shape(k as u32),
             ends: [end, end],
@@ -595,8 +590,8 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 
 /// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization.
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, iterations: u32) -> bool {
-    let Scratch { rows, start, start_frame, start_shape_pose, step, .. } = scratch;
-    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let Scratch { rows, start, start_shape_pose, step, .. } = scratch;
+    let start = Start { position: start, shape: start_shape_pose };
     let (sliders, border) = (&rows.sliders, &rows.border);
     let mut settled = true;
     // Rod by rod: what a taut one bears says nothing about a light one.
@@ -697,8 +692,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
 
 /// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed with.
 pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
-    let Scratch { rows, start, start_frame, start_shape_pose, .. } = scratch;
-    let start = Start { position: start, frame: start_frame, shape: start_shape_pose };
+    let Scratch { rows, start, start_shape_pose, .. } = scratch;
+    let start = Start { position: start, shape: start_shape_pose };
     let mut contacts = core::mem::take(&mut state.shape_contacts);
     contacts.clear();
     for row in &mut rows.shapes {

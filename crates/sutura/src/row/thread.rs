@@ -4,16 +4,16 @@
 //! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two pieces too near,
 //! another row is added at their present closest places.
 //!
-//! Friction acts at the surface, with its arm on the frame, but does not turn a thread about its own axis: threads slide on each other and do
+//! Friction acts at the centerline, as the normal force does. It does not turn a thread about its own axis: threads slide on each other and do
 //! not roll. (Spin has next to no inertia and, on a thread whose ends are free to turn, no stiffness: the compliance it adds to the small
-//! problem is a thousand times the rest, and the solve does not converge.)
+//! problem is a thousand times the rest, and the solve does not converge.) Nor has it an arm about the other two: a thread drawn over a post of
+//! radius R would slide at its surface by R / (R + r) of its way only, and over an edge not at all.
 //!
 //! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the next substep.
 //!
 //! [`couple`]: crate::row::couple
 
 use crate::collide::{Candidates, relative_motion, segment};
-use crate::math::log;
 use crate::model::Model;
 use crate::params;
 use crate::row::Start;
@@ -31,8 +31,6 @@ pub(crate) struct ThreadRow {
     t: f64,
     /// Normal from b toward a and two tangents.
     axes: [DVec3; 3],
-    /// Directions of the two threads.
-    along: [DVec3; 2],
     /// Distance kept between the centerlines \[m\] and the two radii.
     sum: f64,
     radii: [f64; 2],
@@ -75,7 +73,6 @@ impl ThreadRow {
             s,
             t,
             axes: [normal, t1, normal.cross(t1)],
-            along: [along.normalize(), (start[b + 1] - start[b]).normalize()],
             sum: sum * (1.0 + params::KEEP),
             radii: [ra.radius, rb.radius],
             hertz,
@@ -97,25 +94,16 @@ impl ThreadRow {
         x[self.a].lerp(x[self.a + 1], self.s) - x[self.b].lerp(x[self.b + 1], self.t)
     }
 
-    /// Slip of the two surfaces against each other since the start of the substep, linear in the rotations, as a vector.
+    /// Slip of the two against each other since the start of the substep, as a vector.
     fn slip(&self, state: &State, start: &Start<'_>) -> DVec3 {
-        let turned = |e: usize, k: usize| {
-            let turn = log(state.orientation[e] * start.frame[e].conjugate());
-            turn - self.along[k] * self.along[k].dot(turn)
-        };
         let n = self.axes[0];
-        let moved = self.apart(&state.position) - self.apart(start.position);
-        let spin = turned(self.a, 0).cross(n * -self.radii[0]) - turned(self.b, 1).cross(n * self.radii[1]);
-        let slip = moved + spin;
+        let slip = self.apart(&state.position) - self.apart(start.position);
         slip - n * n.dot(slip)
     }
 
     fn endpoints(&self) -> [Endpoint; 2] {
         let [n, t1, t2] = self.axes;
-        [
-            Endpoint::new(self.a, self.s, self.axes, n * -self.radii[0], self.along[0]),
-            Endpoint::new(self.b, self.t, [-n, -t1, -t2], n * self.radii[1], self.along[1]),
-        ]
+        [Endpoint::new(self.a, self.s, self.axes), Endpoint::new(self.b, self.t, [-n, -t1, -t2])]
     }
 
     /// How deep its force presses the two into each other \[m\].
@@ -319,10 +307,8 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
             row.force = DVec3::ZERO;
             continue;
         }
-        let turn = |e: usize, k: usize| step[2 * e + 1] - row.along[k] * row.along[k].dot(step[2 * e + 1]);
-        let spin = turn(row.a, 0).cross(n * -row.radii[0]) - turn(row.b, 1).cross(n * row.radii[1]);
         row.entered = row.compliance();
-        let slip = row.slip(state, start) + moved + spin + row.drift - row.anchor * row.entered;
+        let slip = row.slip(state, start) + moved + row.drift - row.anchor * row.entered;
         let (allowed, normal) = regain(row.start_gap, row.carried, row.entered);
         let [a, b] = row.endpoints();
         entries.push(Entry {
@@ -418,7 +404,7 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
 
 /// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left undone.
 pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
-    let start = Start { position: &scratch.start, frame: &scratch.start_frame, shape: &scratch.start_shape_pose };
+    let start = Start { position: &scratch.start, shape: &scratch.start_shape_pose };
     let mut contacts = core::mem::take(&mut state.thread_contacts);
     contacts.clear();
     for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {

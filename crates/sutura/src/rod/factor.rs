@@ -61,6 +61,16 @@ impl Pivot {
     fn upper_mat(&self, m: &DMat3) -> DMat3 {
         DMat3::from_cols(self.upper(m.x_axis), self.upper(m.y_axis), self.upper(m.z_axis))
     }
+    /// `l m`.
+    fn times_lower(&self, m: &DMat3) -> DMat3 {
+        let col = |v: DVec3| DVec3::new(v.x, self.l10 * v.x + v.y, self.l20 * v.x + self.l21 * v.y + v.z);
+        DMat3::from_cols(col(m.x_axis), col(m.y_axis), col(m.z_axis))
+    }
+    /// `l d l^T`.
+    fn whole(&self) -> DMat3 {
+        let l = self.times_lower(&DMat3::IDENTITY);
+        l * DMat3::from_diagonal(DVec3::ONE / self.inv) * l.transpose()
+    }
     /// The inverse of the pivot times `m`.
     #[inline(always)]
     fn solve_mat(&self, m: &DMat3) -> DMat3 {
@@ -522,6 +532,26 @@ impl System {
             self.inverse[i] = own.add(&k.mul(&self.inverse[i + 1]).mul(&k.transpose()));
             self.transfer[i] = k;
         }
+    }
+
+    /// The matrix at zone block `i` and from it to the next, as left by the elimination of what is before it in the zone and beyond the zone.
+    pub fn zone_block(&self, i: usize) -> (Block, Block) {
+        let (px, pt) = (&self.pivots[2 * i], &self.pivots[2 * i + 1]);
+        let w = &self.next[2 * i];
+        let own = Block {
+            xx: px.whole(),
+            xt: px.times_lower(w),
+            tx: DMat3::ZERO,
+            tt: pt.whole() + t_mul(w, &scale_rows(w, px.inv)),
+        };
+        let v = &self.after[2 * i];
+        let to = Block {
+            xx: px.times_lower(v),
+            xt: DMat3::ZERO,
+            tx: pt.times_lower(&self.next[2 * i + 1]) + t_mul(w, &scale_rows(v, px.inv)),
+            tt: pt.times_lower(&self.after[2 * i + 1]),
+        };
+        (own, to)
     }
 
     /// Inverse at zone block `i`.

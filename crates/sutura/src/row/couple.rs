@@ -10,9 +10,13 @@
 use crate::params;
 use crate::rod::factor::{Block, Columns, System};
 use crate::row::cone::{Cone, Limits};
+use crate::row::dense::Dense;
+use crate::row::sparse::Sparse;
+use crate::row::border::Border;
 use crate::row::{Start, shape, thread};
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;
+use core::ops::Range;
 use glam::{DMat3, DVec3};
 
 /// The row that an entry stands for.
@@ -43,6 +47,10 @@ impl Endpoint {
         let keep = |node: usize, columns: DMat3| if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns };
         let x = 2 * self.element;
         Endpoint { here: keep(x, self.here), next: keep(x + 2, self.next), ..*self }
+    }
+
+    fn within(&self, zone: &Range<usize>) -> bool {
+        zone.contains(&self.element) && self.element + 1 < zone.end
     }
 
     fn push(&self, force: DVec3, right: &mut [DVec3]) {
@@ -79,6 +87,10 @@ impl Entry {
     fn ends(&self) -> &[Endpoint] {
         &self.ends[..1 + usize::from(self.two)]
     }
+
+    fn touches(&self, zone: &Range<usize>) -> bool {
+        self.ends().iter().any(|p| p.within(zone))
+    }
 }
 
 /// An endpoint and the number of its entry.
@@ -88,23 +100,130 @@ struct Placed {
     at: Endpoint,
 }
 
-/// Memory of the coupling.
+/// Memory of how a dense S is put together.
 #[derive(Default)]
-pub(crate) struct Coupling {
-    entries: Vec<Entry>,
+struct Assembly {
     endpoints: Vec<Placed>,
     /// Zone blocks that endpoints touch, ascending, and the transfer from each to the one before it.
     blocks: Vec<usize>,
     jumps: Vec<Block>,
-    s: Vec<f64>,
+    /// Response of each component to what rods share.
+    reach: Vec<f64>,
+    small: Vec<f64>,
+}
+
+impl Assembly {
+    /// Adds `G W G^T` of each rod to the upper triangle of `s`.
+    fn compliance(&mut self, system: &mut System, rods: &[(Range<usize>, Range<usize>)], freedom: &[Freedom], entries: &[Entry], s: &mut [f64]) {
+        let Assembly { endpoints, blocks, jumps, .. } = self;
+        for (_, zone) in rods {
+            endpoints.clear();
+            for (k, entry) in entries.iter().enumerate() {
+                let inside = entry.ends().iter().filter(|p| p.within(zone));
+                endpoints.extend(inside.map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
+            }
+            if endpoints.is_empty() {
+                continue;
+            }
+            endpoints.sort_unstable_by_key(|p| (p.at.element, p.entry));
+            system.invert_zone(zone);
+            blocks.clear();
+            for p in endpoints.iter() {
+                for k in [p.at.element, p.at.element + 1] {
+                    if blocks.last().is_none_or(|l| *l < k) {
+                        blocks.push(k);
+                    }
+                }
+            }
+            // Transfer from each touched block up to the one before it.
+            jumps.clear();
+            jumps.push(Block::default());
+            for pair in blocks.windows(2) {
+                let mut jump = system.transfer(pair[1] - 1).negated();
+                for k in (pair[0]..pair[1] - 1).rev() {
+                    jump = system.transfer(k).negated().mul(&jump);
+                }
+                jumps.push(jump);
+            }
+            compliance_between(system, endpoints, blocks, jumps, s, 3 * entries.len());
+        }
+    }
+
+    /// Adds what gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld itself moves.
+    fn shared(&mut self, border: &mut Border, entries: &[Entry], s: &mut [f64]) {
+        let (m, n) = (border.count(), 3 * entries.len());
+        if m == 0 {
+            return;
+        }
+        let Assembly { reach, small, .. } = self;
+        reach.clear();
+        for entry in entries {
+            for axis in 0..3 {
+                let unit = DVec3::AXES[axis];
+                for k in 0..m {
+                    let own = entry.slider.map_or(0.0, |(j, d)| if j == k { d[axis] } else { 0.0 });
+                    reach.push(entry.ends().iter().map(|p| p.work(unit, border.response(k))).sum::<f64>() - own);
+                }
+            }
+        }
+        for i in 0..n {
+            small.clear();
+            small.extend_from_slice(&reach[i * m..(i + 1) * m]);
+            border.solve_small(small);
+            for j in i..n {
+                s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
+}
+
+/// Adds the contacts' own compliance to the diagonal, and mirrors the upper triangle.
+fn finish_dense(entries: &[Entry], s: &mut [f64]) {
+    let n = 3 * entries.len();
+    for (k, entry) in entries.iter().enumerate() {
+        for (axis, i) in (3 * k..3 * k + 3).enumerate() {
+            s[i * n + i] += entry.compliance[axis];
+            for j in 0..i {
+                s[i * n + j] = s[j * n + i];
+            }
+        }
+    }
+}
+
+/// Contacts that press, where threads touch each other, up to which S is put together in any case.
+const MANY: usize = 64;
+
+/// Whether the contacts are so many that S is better not put together: rough counts of multiplications. A dense solve puts it together and factors it about
+/// twice; a sparse one eliminates each block of the zones with two neighbors and those that contacts touch with five, about thrice. What rods share and the
+/// tension unknowns of inextensible elements are in the dense one only.
+fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry], n: usize) -> bool {
+    if entries.iter().filter(|e| e.force.x > 0.0).count() < MANY && entries.iter().any(|e| e.two) {
+        return false;
+    }
+    let mut blocks = 0;
+    for (_, zone) in rods.iter().filter(|(_, zone)| entries.iter().any(|e| e.touches(zone))) {
+        if system.tied[zone.clone()].contains(&true) {
+            return false;
+        }
+        blocks += zone.len();
+    }
+    let touched = (2 * entries.iter().map(|e| e.ends().len()).sum::<usize>()).min(blocks);
+    let n = n as f64;
+    30.0 * n * n + n * n * n / 3.0 > 3.0 * (1500.0 * blocks as f64 + 5000.0 * touched as f64)
+}
+
+/// Memory of the coupling.
+#[derive(Default)]
+pub(crate) struct Coupling {
+    entries: Vec<Entry>,
+    assembly: Assembly,
+    dense: Dense,
+    sparse: Sparse,
     b: Vec<f64>,
     mu: Vec<f64>,
     force: Vec<f64>,
     cone: Cone,
     right: Vec<DVec3>,
-    /// Response of each component to what rods share.
-    reach: Vec<f64>,
-    small: Vec<f64>,
     /// Residual of the last solution, in radii.
     left: f64,
 }
@@ -154,7 +273,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     if rows.solver.entries.is_empty() {
         return;
     }
-    let Coupling { entries, endpoints, blocks, jumps, s, b, mu, force, cone, right, reach, small, left } = &mut rows.solver;
+    let Coupling { entries, assembly, dense, sparse, b, mu, force, cone, right, left } = &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -164,80 +283,36 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         force.extend(entry.force.to_array());
     }
     let n = b.len();
+    let smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
+    let mut limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: 0.0 };
+    let many = rows.border.count() == 0 && pays(system, rods, entries, n);
+    limits.work = if many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
     // Putting S together, and the most that its solution may take.
-    *work += 30.0 * (n * n) as f64 + params::CONTACT_WORK.max((n * n * n) as f64 / 3.0);
+    *work += if many { limits.work } else { 30.0 * (n * n) as f64 + limits.work };
     if *work > params::SUBSTEP_WORK {
         *left = f64::INFINITY;
         entries.clear();
         return;
     }
-    s.clear();
-    s.resize(n * n, 0.0);
-    for (_, zone) in rods.iter() {
-        endpoints.clear();
-        for (k, entry) in entries.iter().enumerate() {
-            let inside = |p: &&Endpoint| zone.contains(&p.element) && p.element + 1 < zone.end;
-            endpoints.extend(entry.ends().iter().filter(inside).map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
+    *left = if many {
+        for (_, zone) in rods.iter().filter(|(_, zone)| entries.iter().any(|e| e.touches(zone))) {
+            system.invert_zone(zone);
         }
-        if endpoints.is_empty() {
-            continue;
-        }
-        endpoints.sort_unstable_by_key(|p| (p.at.element, p.entry));
-        system.invert_zone(zone);
-        blocks.clear();
-        for p in endpoints.iter() {
-            for k in [p.at.element, p.at.element + 1] {
-                if blocks.last().is_none_or(|l| *l < k) {
-                    blocks.push(k);
-                }
-            }
-        }
-        // Transfer from each touched block up to the one before it.
-        jumps.clear();
-        jumps.push(Block::default());
-        for pair in blocks.windows(2) {
-            let mut jump = system.transfer(pair[1] - 1).negated();
-            for k in (pair[0]..pair[1] - 1).rev() {
-                jump = system.transfer(k).negated().mul(&jump);
-            }
-            jumps.push(jump);
-        }
-        compliance_between(system, endpoints, blocks, jumps, s, n);
-    }
-    // What gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld itself moves.
-    let m = rows.border.count();
-    if m > 0 {
-        reach.clear();
+        sparse.begin(system, rods.iter().map(|(_, zone)| zone).filter(|zone| entries.iter().any(|e| e.touches(zone))));
         for entry in entries.iter() {
-            for axis in 0..3 {
-                let unit = DVec3::AXES[axis];
-                for k in 0..m {
-                    let own = entry.slider.map_or(0.0, |(j, d)| if j == k { d[axis] } else { 0.0 });
-                    reach.push(entry.ends().iter().map(|p| p.work(unit, rows.border.response(k))).sum::<f64>() - own);
-                }
-            }
+            let ends = entry.ends().iter().map(|p| p.restricted(freedom));
+            let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
+            sparse.push(ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]), entry.compliance, diagonal);
         }
-        for i in 0..n {
-            small.clear();
-            small.extend_from_slice(&reach[i * m..(i + 1) * m]);
-            rows.border.solve_small(small);
-            for j in i..n {
-                s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
-            }
-        }
-    }
-    let mut smallest = f64::INFINITY;
-    for (k, entry) in entries.iter().enumerate() {
-        smallest = smallest.min(entry.radius);
-        for (axis, i) in (3 * k..3 * k + 3).enumerate() {
-            s[i * n + i] += entry.compliance[axis];
-            for j in 0..i {
-                s[i * n + j] = s[j * n + i];
-            }
-        }
-    }
-    let limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
-    *left = cone.solve(s, b, mu, force, &limits) / smallest;
+        if sparse.prepare() { cone.solve(sparse, b, mu, force, &limits) } else { f64::INFINITY }
+    } else {
+        dense.begin(n);
+        assembly.compliance(system, rods, freedom, entries, &mut dense.s);
+        assembly.shared(&mut rows.border, entries, &mut dense.s);
+        finish_dense(entries, &mut dense.s);
+        cone.solve(dense, b, mu, force, &limits)
+    } / smallest;
+    *work -= cone.left().max(0.0);
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
     for (k, entry) in entries.iter_mut().enumerate() {
@@ -291,20 +366,30 @@ pub(crate) fn work(scratch: &Scratch) -> f64 {
     scratch.rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
 }
 
+/// What an endpoint's components do to the two blocks that they touch.
+fn response(system: &System, p: &Endpoint) -> (Columns, Columns) {
+    let (here, next, k) = (system.inverse(p.element), system.inverse(p.element + 1), system.transfer(p.element));
+    let columns = |x: DMat3| Columns { x, t: DMat3::ZERO };
+    let kt = k.transpose().mul_columns(&columns(p.here));
+    let pushed = next.mul_columns(&Columns { x: p.next - kt.x, t: -kt.t });
+    let direct = next.mul_columns(&columns(p.next));
+    let (own, up) = (here.mul_columns(&columns(p.here)), k.mul_columns(&direct));
+    (Columns { x: own.x - up.x, t: own.t - up.t }, pushed)
+}
+
+/// Compliance of an endpoint along each of its axes.
+fn own_compliance(system: &System, p: &Endpoint) -> DVec3 {
+    let (here, next) = response(system, p);
+    let along = |k: usize| p.here.col(k).dot(here.x.col(k)) + p.next.col(k).dot(next.x.col(k));
+    DVec3::new(along(0), along(1), along(2))
+}
+
 /// Adds `G W G^T` over the endpoints of one rod to the upper triangle of `s`.
 fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], jumps: &[Block], s: &mut [f64], n: usize) {
     for (qi, q) in endpoints.iter().enumerate() {
         // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
-        let (e, q_at) = (q.at.element, &q.at);
-        let (x_here, x_next, k) = (system.inverse(e), system.inverse(e + 1), system.transfer(e));
-        let columns = |x: DMat3| Columns { x, t: DMat3::ZERO };
-        let kt = k.transpose().mul_columns(&columns(q_at.here));
-        let pushed = Columns { x: q_at.next - kt.x, t: -kt.t };
-        let mut next = x_next.mul_columns(&pushed);
-        let direct = x_next.mul_columns(&columns(q_at.next));
-        let up = k.mul_columns(&direct);
-        let own = x_here.mul_columns(&columns(q_at.here));
-        let mut here = Columns { x: own.x - up.x, t: own.t - up.t };
+        let (mut here, mut next) = response(system, &q.at);
+        let e = q.at.element;
         let mut at = blocks.partition_point(|b| *b < e);
         let mut pi = qi + 1;
         // Endpoints on the same element after q are handled when they are q.

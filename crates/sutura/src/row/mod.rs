@@ -4,9 +4,12 @@
 pub(crate) mod border;
 pub(crate) mod cone;
 pub(crate) mod couple;
+pub(crate) mod delassus;
+pub(crate) mod dense;
 pub(crate) mod ldl;
 pub(crate) mod pushed;
 pub(crate) mod shape;
+pub(crate) mod sparse;
 pub(crate) mod thread;
 pub(crate) mod weld;
 

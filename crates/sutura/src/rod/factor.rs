@@ -538,12 +538,7 @@ impl System {
     pub fn zone_block(&self, i: usize) -> (Block, Block) {
         let (px, pt) = (&self.pivots[2 * i], &self.pivots[2 * i + 1]);
         let w = &self.next[2 * i];
-        let own = Block {
-            xx: px.whole(),
-            xt: px.times_lower(w),
-            tx: DMat3::ZERO,
-            tt: pt.whole() + t_mul(w, &scale_rows(w, px.inv)),
-        };
+        let own = Block { xx: px.whole(), xt: px.times_lower(w), tx: DMat3::ZERO, tt: pt.whole() + t_mul(w, &scale_rows(w, px.inv)) };
         let v = &self.after[2 * i];
         let to = Block {
             xx: px.times_lower(v),
@@ -720,11 +715,11 @@ impl Pivot2 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
     /// A pseudo-random symmetric positive definite system of `n` blocks whose stiffnesses spread over eight decades.
-    fn sample(n: usize) -> System {
+    pub(crate) fn sample(n: usize) -> System {
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         let mut rnd = move || {
             seed ^= seed << 13;

@@ -345,7 +345,6 @@ fn onto_disc(y: f64, z: f64, radius: f64) -> (f64, f64) {
     if size > radius { (y * radius / size, z * radius / size) } else { (y, z) }
 }
 
-
 #[cfg(test)]
 mod tests {
     use super::*;

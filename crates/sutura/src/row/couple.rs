@@ -9,10 +9,10 @@
 
 use crate::params;
 use crate::rod::factor::{Block, Columns, System};
+use crate::row::border::Border;
 use crate::row::cone::{Cone, Limits};
 use crate::row::dense::Dense;
 use crate::row::sparse::Sparse;
-use crate::row::border::Border;
 use crate::row::{Start, shape, thread};
 use crate::scratch::{Freedom, Scratch};
 use crate::state::State;

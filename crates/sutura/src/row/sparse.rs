@@ -631,3 +631,106 @@ fn lu_solve_one(a: &Mat6, x: &mut Vec6) {
         x[i] /= a[7 * i];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::factor::tests::sample;
+
+    const BLOCKS: usize = 24;
+
+    fn random(seed: &mut u64) -> f64 {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    }
+
+    /// Contacts between blocks of one rod, some of them far apart, and S put together from solutions of the rod.
+    fn problem(seed: &mut u64) -> (Sparse, Vec<f64>) {
+        let (rod, zone) = (0..BLOCKS, 3..BLOCKS - 2);
+        let mut system = sample(BLOCKS);
+        assert!(system.factor(rod.clone(), &zone));
+        system.invert_zone(&zone);
+        let mut sparse = Sparse::default();
+        sparse.begin(&system, [&zone].into_iter());
+        let mut sides = Vec::new();
+        for k in 0..9 {
+            let first = zone.start + k;
+            let blocks = if k % 3 == 0 { vec![first, first + 1] } else { vec![first, first + 1, zone.end - 2 - k, zone.end - 1 - k] };
+            let side: Vec<(usize, DMat3)> = blocks.iter().map(|b| (*b, DMat3::from_cols_array(&core::array::from_fn(|_| random(seed))))).collect();
+            let tangential = 0.01 + random(seed).abs();
+            sparse.push(side.iter().copied(), DVec3::new(0.01 + random(seed).abs(), tangential, tangential), DVec3::ONE);
+            sides.push(side);
+        }
+        assert!(sparse.prepare());
+        let n = 3 * sides.len();
+        let mut s = vec![0.0; n * n];
+        for j in 0..n {
+            let mut z = vec![DVec3::ZERO; 2 * BLOCKS];
+            for (b, x) in &sides[j / 3] {
+                z[2 * b] += x.col(j % 3);
+            }
+            system.solve_all(rod.clone(), &zone, &mut z);
+            for i in 0..n {
+                s[i * n + j] = sides[i / 3].iter().map(|(b, x)| x.col(i % 3).dot(z[2 * b])).sum();
+            }
+            s[j * n + j] += sparse.sites[j / 3].compliance[j % 3];
+        }
+        (sparse, s)
+    }
+
+    fn times(s: &[f64], l: &[f64]) -> Vec<f64> {
+        s.chunks_exact(l.len()).map(|r| r.iter().zip(l).map(|(a, b)| a * b).sum()).collect()
+    }
+
+    #[test]
+    fn is_the_matrix_that_solutions_of_the_rod_put_together() {
+        let seed = &mut 7;
+        let (mut sparse, s) = problem(seed);
+        let l: Vec<f64> = (0..27).map(|_| random(seed)).collect();
+        let (mut product, exact) = (vec![0.0; l.len()], times(&s, &l));
+        sparse.add_product(&l, &mut product);
+        let size = exact.iter().fold(0.0f64, |a, v| a.max(v.abs()));
+        assert!(product.iter().zip(&exact).all(|(a, b)| (a - b).abs() < 1e-9 * size), "{product:?} {exact:?}");
+    }
+
+    #[test]
+    fn solves_working_sets() {
+        let seed = &mut 11;
+        let (mut sparse, s) = problem(seed);
+        let mu = vec![0.3; 9];
+        // Several, one after the other, so that most of the factorization is kept.
+        for round in 0..6 {
+            let friction = |k: usize| match (k + round) % 3 {
+                0 => Friction::None,
+                1 => Friction::Inside,
+                _ => Friction::Rim(0.6, -0.8, 0.2),
+            };
+            let set = WorkingSet { pressed: (0..9).map(|k| (k + round) % 4 != 0).collect(), friction: (0..9).map(friction).collect() };
+            let b: Vec<f64> = (0..27).map(|_| random(seed)).collect();
+            let mut change = vec![0.0; 27];
+            for following in [false, true] {
+                let solved = if following { sparse.solve_following(&set, &b, &mu, &mut change) } else { sparse.solve_set(&set, &b, 0.0, &mut change) };
+                assert!(solved);
+                let gradient: Vec<f64> = times(&s, &change).iter().zip(&b).map(|(a, b)| a + b).collect();
+                for c in 0..9 {
+                    let (l, g) = (&change[3 * c..3 * c + 3], &gradient[3 * c..3 * c + 3]);
+                    let none = |v: f64| v.abs() < 1e-8;
+                    assert!(none(if set.pressed[c] { g[0] } else { l[0] }), "contact {c}: {l:?} {g:?}");
+                    if following && !set.pressed[c] {
+                        assert!(none(l[1]) && none(l[2]));
+                        continue;
+                    }
+                    match set.friction[c] {
+                        Friction::None => assert!(none(l[1]) && none(l[2])),
+                        Friction::Inside => assert!(none(g[1]) && none(g[2])),
+                        Friction::Rim(y, z, turn) => {
+                            let radial = l[1] * y + l[2] * z - if following { mu[c] * l[0] } else { 0.0 };
+                            let along = l[2] * y - l[1] * z;
+                            assert!(none(radial) && none(g[2] * y - g[1] * z + turn * along), "contact {c}: {l:?} {g:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

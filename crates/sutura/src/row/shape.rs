@@ -317,8 +317,10 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
             shape.collider.least_between(next, next.map(|p| shape.collider.distance_local(p)), below, |s, d| between(s, d.value));
         }
         for s in &places[..count] {
-            let (before, now) = site.look(*s);
-            add(*s, before, now);
+            let seen = site.look(*s);
+            let kept = keep_place(&state.shape_contacts, &site, *s, nearer(seen), radius);
+            let (before, now) = if kept == *s { seen } else { site.look(kept) };
+            add(kept, before, now);
         }
     }
     rows.sort_unstable_by(|a, b| a.key().partial_cmp(&b.key()).expect("places are numbers"));
@@ -336,6 +338,19 @@ fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool 
     // The distance grows by way^2 / (2 (R + r)) from the nearest place of a surface of radius R.
     let sharp = way * way < 4.0 * radius * bulge;
     s > 0.02 && s < 0.98 && (bulge > BULGE * radius || sharp && bulge > SHARP_BULGE * radius)
+}
+
+/// Where a place within an element is taken to touch: where it last did, as far as that is about as near as the nearest place `s`, whose distance is `value`. The
+/// nearest place on a flat surface runs along the element with the least tilt, and a row that follows it makes the element rock: it would tilt back by as much in the
+/// next substep.
+fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, radius: f64) -> f64 {
+    let place = |c: &ShapeContact| (c.shape, c.element as usize);
+    let from = old.partition_point(|c| place(c) < (site.slot, site.element));
+    let near = old[from..].iter().take_while(|c| place(c) == (site.slot, site.element)).filter(|c| c.s > 0.0 && c.s < 1.0);
+    let Some(last) = near.map(|c| c.s).min_by(|a, b| (a - s).abs().total_cmp(&(b - s).abs())) else { return s };
+    let (before, now) = site.look(last);
+    let (farther, allowed) = (before.value.min(now.value) - value, params::SAME_PLACE * radius);
+    s + (last - s) * if farther <= allowed { 1.0 } else { (allowed / farther).sqrt() }
 }
 
 /// Drops rows at particles beside an edge that has its own row on the element: both have the same foot. A thread bears on an edge with its side, across its direction; a

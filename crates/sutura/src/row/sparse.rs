@@ -3,7 +3,9 @@
 //! touch have a narrow graph whatever the number of contacts (along two strands wound about each other fronts are some four blocks wide), so the cost is linear
 //! in it. With w = S l + b the gradient and B the force per gap of a contact of the set,
 //!
-//!     (A + G^T B G) z = -G^T B w,      change of the forces = -B (w + G z),
+//! ```text
+//! (A + G^T B G) z = -G^T B w,      change of the forces = -B (w + G z),
+//! ```
 //!
 //! which by elimination of z is the working set's own equation. Pivots are safe without exchange: A is positive definite, and contacts are about as stiff as
 //! stretch. What did not change since the last factorization, and all that it was eliminated into, is not factored again.
@@ -105,7 +107,7 @@ impl Sparse {
             // The factor's pivots are what is left after the blocks before: what those took is put back, U^T P^-1 U = K^T U.
             for i in zone.start..zone.end - 1 {
                 let k = from + i - zone.start;
-                let transfer = whole(&system.transfer(i));
+                let transfer = whole(system.transfer(i));
                 let Some(u) = self.next[k] else { continue };
                 let to = &mut self.diagonal[k + 1];
                 for r in 0..6 {

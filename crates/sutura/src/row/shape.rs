@@ -95,6 +95,9 @@ enum Mode {
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
 
+/// Radius of a surface, with the thread's own, from which on a row within an element does not follow the nearest place, in radii of the thread.
+const FLAT: f64 = 8.0;
+
 /// How often a firm row may slide and stop in a substep.
 const RESTLESS: u32 = 1;
 
@@ -318,7 +321,7 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
         }
         for s in &places[..count] {
             let seen = site.look(*s);
-            let kept = keep_place(&state.shape_contacts, &site, *s, nearer(seen), radius);
+            let kept = keep_place(&state.shape_contacts, &site, *s, nearer(seen), length, radius);
             let (before, now) = if kept == *s { seen } else { site.look(kept) };
             add(kept, before, now);
         }
@@ -342,14 +345,19 @@ fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool 
 
 /// Where a place within an element is taken to touch: where it last did, as far as that is about as near as the nearest place `s`, whose distance is `value`. The
 /// nearest place on a flat surface runs along the element with the least tilt, and a row that follows it makes the element rock: it would tilt back by as much in the
-/// next substep.
-fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, radius: f64) -> f64 {
+/// next substep. On an edge it stays where it is while the thread is drawn over it, and the row has to follow.
+fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, length: f64, radius: f64) -> f64 {
     let place = |c: &ShapeContact| (c.shape, c.element as usize);
     let from = old.partition_point(|c| place(c) < (site.slot, site.element));
     let near = old[from..].iter().take_while(|c| place(c) == (site.slot, site.element)).filter(|c| c.s > 0.0 && c.s < 1.0);
     let Some(last) = near.map(|c| c.s).min_by(|a, b| (a - s).abs().total_cmp(&(b - s).abs())) else { return s };
     let (before, now) = site.look(last);
-    let (farther, allowed) = (before.value.min(now.value) - value, params::SAME_PLACE * radius);
+    let farther = before.value.min(now.value) - value;
+    // The distance grows by way^2 / (2 (R + r)) from the nearest place of a surface of radius R.
+    let (way, allowed) = ((last - s) * length, params::SAME_PLACE * radius);
+    if way * way < 2.0 * FLAT * radius * farther {
+        return s;
+    }
     s + (last - s) * if farther <= allowed { 1.0 } else { (allowed / farther).sqrt() }
 }
 

@@ -253,3 +253,61 @@ between = ["34 mN", "48 mN"]
 "#,
     );
 }
+
+/// Two threads crossed between a table and a plate lie as deep in each other as Hertz says, wherever the joints are: with an even number of elements the places that
+/// cross are at a joint, with an odd one in the middle of an element. For 5 N the depth is 11.6 % of the diameter, from 2 % before touch on.
+#[test]
+fn a_crossing_is_as_deep_wherever_the_joints_are() {
+    for (a, b, aside) in [(40, 40, 0.0), (40, 41, 0.0), (41, 41, 0.0), (40, 40, 0.05), (40, 40, 0.2)] {
+        let thread = |name: &str, elements: u32, from: String, to: String| {
+            format!(
+                r#"
+[[thread]]
+name = "{name}"
+diameter = "0.32 mm"
+young_modulus = "2.2 GPa"
+density = "1140 kg/m^3"
+elements = {elements}
+line = {{ from = "{from} mm", to = "{to} mm" }}
+[[grip]]
+name = "g{name}"
+thread = "{name}"
+at = "start"
+hold = "clamp"
+"#
+            )
+        };
+        let lower = thread("a", a, "[-10, 0, 0.165]".into(), "[10, 0, 0.165]".into());
+        let upper = thread("b", b, format!("[{aside}, -10, 0.49]"), format!("[{aside}, 10, 0.49]"));
+        holds(&format!(
+            r#"
+[solver]
+linear_damping = 0.9
+angular_damping = 0.9
+[friction]
+default = 0.2
+{lower}{upper}
+[[shape]]
+name = "table"
+kind = "box"
+sides = ["1 mm", "1 mm", "1 mm"]
+position = "[0, 0, -0.5] mm"
+[[shape]]
+name = "plate"
+kind = "box"
+sides = ["1 mm", "1 mm", "1 mm"]
+position = "[0, 0, 1.16] mm"
+[[phase]]
+name = "press"
+duration = "0.5 s"
+action = [{{ push = "plate", direction = [0, 0, -1], force = "5 N", speed_limit = "0.1 m/s" }}]
+[[check]]
+name = "depth"
+that = "thread_clearance()"
+after = "press"
+equals = -0.0962
+tolerance = "2 %"
+"#
+        ));
+    }
+}

@@ -38,7 +38,7 @@ fn stepped(which: usize) -> Vec<u8> {
     world.snapshot()
 }
 
-/// Where the state begins in a snapshot: from its first field, the time, on it differs from that of a new world.
+/// Finds where the state begins in a snapshot: from its first field, the time, on it differs from that of a new world.
 fn state_from(which: usize, good: &[u8]) -> usize {
     let new = world(which).snapshot();
     good.iter().zip(&new).take_while(|(a, b)| a == b).count()

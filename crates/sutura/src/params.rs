@@ -229,7 +229,8 @@ pub(crate) const SLIP: f64 = 1e-3;
 /// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two factorizations. (One that is cut short
 /// has friction that does not hold yet: in a rope of threads that feeds itself from substep to substep.)
 pub(crate) const CONTACT_WORK: f64 = 3e6;
-/// The same where the matrix of the contacts is sparse. Dozens of factorizations: with eight a twist of 200 contacts did not come to its end.
+/// Multiplications that a contact solve may spend where its matrix is sparse. That is dozens of factorizations: with eight a twist of
+/// 200 contacts did not come to its end.
 pub(crate) const SPARSE_WORK: f64 = 3e8;
 /// Work that a substep with all its halves may take, in rough counts of multiplications, so a minute or so. No sample scene reaches it. What takes more will not come to an end in any time worth waiting for: the world counts as stuck.
 pub(crate) const SUBSTEP_WORK: f64 = 5e10;

@@ -193,7 +193,7 @@ fn finish_dense(entries: &[Entry], s: &mut [f64]) {
 /// Contacts that press, where threads touch each other, up to which S is put together in any case.
 const MANY: usize = 64;
 
-/// Whether the contacts are so many that S is better not put together: rough counts of multiplications. A dense solve puts it together and factors it about
+/// Says whether the contacts are so many that S is better not put together, by rough counts of multiplications. A dense solve puts it together and factors it about
 /// twice; a sparse one eliminates each block of the zones with two neighbors and those that contacts touch with five, about thrice. What rods share and the
 /// tension unknowns of inextensible elements are in the dense one only.
 fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry], n: usize) -> bool {
@@ -366,7 +366,7 @@ pub(crate) fn work(scratch: &Scratch) -> f64 {
     scratch.rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
 }
 
-/// What an endpoint's components do to the two blocks that they touch.
+/// Computes how the two blocks that an endpoint touches move under unit forces along its components.
 fn response(system: &System, p: &Endpoint) -> (Columns, Columns) {
     let (here, next, k) = (system.inverse(p.element), system.inverse(p.element + 1), system.transfer(p.element));
     let columns = |x: DMat3| Columns { x, t: DMat3::ZERO };

@@ -1,10 +1,10 @@
-//! What the contact solver sees of the problem's matrix, the Delassus matrix S = G W G^T with the contacts' own compliance on its diagonal: [`Dense`]
+//! The contact solver sees the problem's matrix through [`Delassus`]: the matrix S = G W G^T with the contacts' own compliance on its diagonal: [`Dense`]
 //! has it in full, [`Sparse`] never puts it together.
 //!
 //! [`Dense`]: crate::row::dense::Dense
 //! [`Sparse`]: crate::row::sparse::Sparse
 
-/// What a friction force may do.
+/// The state of a friction force in the working set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Friction {
     /// Its disc is a point.
@@ -36,7 +36,7 @@ pub(crate) trait Delassus {
     /// Contacts that enter the working set together: none yet.
     fn none_entered(&mut self);
 
-    /// Whether a contact may enter with those that have, since it does not depend on them. It counts as one of them then.
+    /// Says whether a contact may enter with those that have, since it does not depend on them, and counts it as one of them then.
     fn enters(&mut self, c: usize) -> bool;
 
     /// Minimizes over the working set without bounds, from a point with this gradient: the change of the forces. Rims may stand a little otherwise where the

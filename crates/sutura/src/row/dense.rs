@@ -76,7 +76,7 @@ pub(crate) struct Dense {
     right: Vec<f64>,
     row: Vec<f64>,
     matrix: Vec<f64>,
-    /// What of each contact is factored: a bit for its normal force, one for its friction.
+    /// Parts of each contact that are factored: a bit for its normal force, one for its friction.
     have: Vec<u8>,
     entered: Vec<usize>,
     spent: f64,

@@ -34,6 +34,13 @@ const TRUSTED: f64 = 0.1;
 /// Move of the last iteration where there are contacts, in radii, that counts as none.
 const NEAR: f64 = 0.03;
 
+/// Iterations in which the way to go must have become half as long, where it is longer than `FAR` radii.
+const SOME: u32 = 4;
+const FAR: f64 = 1.0;
+
+/// Iterations in a row that may leave the contact problem unsolved.
+const UNSOLVED: u32 = 2;
+
 /// Least part of an iteration that the next one is taken to do, where they shrink fast.
 const SLACKEN: f64 = 0.2;
 
@@ -65,6 +72,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
+    // Way that was to go some iterations ago, in radii, and iterations in a row whose contact problem was not solved.
+    let (mut way, mut unsolved) = (f64::INFINITY, 0);
     while out.iterations < settings.newton_max && !scratch.exhausted() {
         out.iterations += 1;
         scratch.work += 300.0 * model.mass.len() as f64 + 100.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
@@ -100,6 +109,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         scratch.rods = blocks;
         scratch.rows.border.couple(&mut scratch.step, false);
         row::couple::couple(state, scratch);
+        row::follow::follow(scratch);
         gained = work_ahead(model, state, scratch);
         let trusted = !waiting || !neglects(model, state, scratch, h);
         scale = limit(state, scratch);
@@ -113,6 +123,20 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
+        }
+        if scale < 1.0 {
+            // What the step was cut for must be met by a contact from now on.
+            row::thread::extend(model, state, scratch);
+        }
+        unsolved = if row::couple::solved(scratch) { 0 } else { unsolved + 1 };
+        let whole = out.residual / scale;
+        let hopeless = unsolved > UNSOLVED || out.iterations.is_multiple_of(SOME) && whole > FAR && whole > 0.5 * way;
+        if hopeless && out.iterations < settings.newton_max {
+            // Substeps half as long have a better chance than more iterations.
+            break;
+        }
+        if first || out.iterations.is_multiple_of(SOME) {
+            way = whole;
         }
         // What the next iteration would do, going by what this one did after the one before.
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };

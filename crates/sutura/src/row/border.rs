@@ -99,6 +99,19 @@ impl Border {
     pub fn step(&self, k: usize) -> f64 {
         self.columns[k].step
     }
+    /// Exchanges the changes of all unknowns in this iteration for others, at first none.
+    pub fn swap_steps(&mut self, steps: &mut Vec<f64>) {
+        steps.resize(self.count, 0.0);
+        for (c, s) in self.columns[..self.count].iter_mut().zip(steps) {
+            core::mem::swap(&mut c.step, s);
+        }
+    }
+    /// Adds to the changes of all unknowns.
+    pub fn add_steps(&mut self, steps: &[f64]) {
+        for (c, s) in self.columns[..self.count].iter_mut().zip(steps) {
+            c.step += s;
+        }
+    }
     /// What a unit of unknown `k` takes away from the step of the rods.
     pub fn response(&self, k: usize) -> &[DVec3] {
         &self.columns[k].response

@@ -17,7 +17,7 @@
 use crate::row::delassus::{Delassus, Friction, WorkingSet};
 
 /// Tolerance and limits of a solve.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Limits {
     /// How far a contact may be from its complementarity \[m\].
     pub residual: f64,
@@ -37,7 +37,7 @@ const EAGER: u32 = 30;
 /// Part of a step in which all friction forces that are near their rims meet them at once.
 const TOGETHER: f64 = 0.1;
 /// Turn of a rim \[rad\], and change of its stiffness over what the diagonal was, beyond which its row is factored again.
-const STALE: f64 = 0.01;
+const STALE: f64 = 1e-3;
 
 /// How much less exact the rims are in the first round: its radii are those of the last forces, and Newton on the radii turns the rims too.
 const FIRST: f64 = 100.0;
@@ -108,6 +108,14 @@ impl Cone {
         }
         l.copy_from_slice(&self.best);
         reached
+    }
+
+    /// Replaces changes of the gaps and slips by those of the forces on the last working set. False when there are none.
+    pub fn response(&mut self, s: &mut impl Delassus, change: &mut [f64]) -> bool {
+        self.gradient.copy_from_slice(change);
+        let solved = s.solve_set(&self.set, &self.gradient, STALE, change);
+        self.left -= s.spent();
+        solved
     }
 
     /// Multiplications that the last solve might still have spent.

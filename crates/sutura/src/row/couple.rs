@@ -224,6 +224,12 @@ pub(crate) struct Coupling {
     force: Vec<f64>,
     cone: Cone,
     right: Vec<DVec3>,
+    change: Vec<f64>,
+    steps: Vec<f64>,
+    /// Whether the sparse matrix is in use, what a solution may take, and the least radius of the entries.
+    many: bool,
+    limits: Limits,
+    smallest: f64,
     /// Residual of the last solution, in radii.
     left: f64,
 }
@@ -273,7 +279,7 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     if rows.solver.entries.is_empty() {
         return;
     }
-    let Coupling { entries, assembly, dense, sparse, b, mu, force, cone, right, left } = &mut rows.solver;
+    let Coupling { entries, assembly, dense, sparse, b, mu, force, cone, right, left, many, limits, smallest, .. } = &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -283,18 +289,18 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         force.extend(entry.force.to_array());
     }
     let n = b.len();
-    let smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
-    let mut limits = Limits { residual: params::CONTACT_TOLERANCE * smallest, rounds: 15, steps: 60, work: 0.0 };
-    let many = rows.border.count() == 0 && pays(system, rods, entries, n);
-    limits.work = if many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
+    *smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
+    *many = rows.border.count() == 0 && pays(system, rods, entries, n);
+    let most = if *many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
+    *limits = Limits { residual: params::CONTACT_TOLERANCE * *smallest, rounds: 15, steps: 60, work: most };
     // Putting S together, and the most that its solution may take.
-    *work += if many { limits.work } else { 30.0 * (n * n) as f64 + limits.work };
+    *work += if *many { most } else { 30.0 * (n * n) as f64 + most };
     if *work > params::SUBSTEP_WORK {
         *left = f64::INFINITY;
         entries.clear();
         return;
     }
-    *left = if many {
+    *left = if *many {
         for (_, zone) in rods.iter().filter(|(_, zone)| entries.iter().any(|e| e.touches(zone))) {
             system.invert_zone(zone);
         }
@@ -304,31 +310,28 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
             sparse.push(ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]), entry.compliance, diagonal);
         }
-        if sparse.prepare() { cone.solve(sparse, b, mu, force, &limits) } else { f64::INFINITY }
+        if sparse.prepare() { cone.solve(sparse, b, mu, force, limits) } else { f64::INFINITY }
     } else {
         dense.begin(n);
         assembly.compliance(system, rods, freedom, entries, &mut dense.s);
         assembly.shared(&mut rows.border, entries, &mut dense.s);
         finish_dense(entries, &mut dense.s);
-        cone.solve(dense, b, mu, force, &limits)
-    } / smallest;
+        cone.solve(dense, b, mu, force, limits)
+    } / *smallest;
     *work -= cone.left().max(0.0);
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
-    for (k, entry) in entries.iter_mut().enumerate() {
-        entry.force = DVec3::new(force[3 * k], force[3 * k + 1], force[3 * k + 2]);
-        for p in entry.ends() {
-            p.push(entry.force, right);
-        }
-        if let Some((slider, direction)) = entry.slider {
-            rows.border.load(slider, direction.dot(entry.force));
-        }
-        match entry.source {
-            Source::Thread(k) => rows.threads[k as usize].force = entry.force,
-            Source::Shape(k) => rows.shapes[k as usize].solved(entry.force),
-        }
+    load(entries, force, &mut rows.border, right);
+    hand_over(entries, force, &mut rows.threads, &mut rows.shapes);
+    respond(rods, system, freedom, &mut rows.border, right);
+    for (z, r) in step.iter_mut().zip(right.iter()) {
+        *z += *r;
     }
-    rows.border.load_carried(right);
+}
+
+/// Replaces forces on the nodes, and those on the unknowns of the border, by the step that they cause.
+fn respond(rods: &[(Range<usize>, Range<usize>)], system: &System, freedom: &[Freedom], border: &mut Border, right: &mut [DVec3]) {
+    border.load_carried(right);
     for (r, freedom) in right.iter_mut().zip(freedom.iter()) {
         if *freedom != Freedom::Free {
             *r = freedom.projector() * *r;
@@ -337,9 +340,98 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     for (rod, zone) in rods.iter() {
         system.solve(rod.clone(), zone, right);
     }
-    rows.border.couple(right, true);
+    border.couple(right, true);
+}
+
+/// Adds to `b` what a step changes of the gaps and slips of the entries.
+fn shift(entries: &[Entry], border: &Border, step: &[DVec3], b: &mut [f64]) {
+    for (entry, b) in entries.iter().zip(b.chunks_exact_mut(3)) {
+        for (axis, b) in b.iter_mut().enumerate() {
+            let unit = DVec3::AXES[axis];
+            let pushed = entry.slider.map_or(0.0, |(k, d)| d[axis] * border.step(k));
+            *b += entry.ends().iter().map(|p| p.work(unit, step)).sum::<f64>() + pushed;
+        }
+    }
+}
+
+/// Adds forces of the entries to right sides.
+fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec3]) {
+    for (entry, f) in entries.iter().zip(force.chunks_exact(3)) {
+        let f = DVec3::from_slice(f);
+        for p in entry.ends() {
+            p.push(f, right);
+        }
+        if let Some((slider, direction)) = entry.slider {
+            border.load(slider, direction.dot(f));
+        }
+    }
+}
+
+/// Replaces forces on the nodes by the step that they cause while the contacts that press go on pressing: the linear response of the last solution. The
+/// border's steps are to be set aside.
+pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
+    let Scratch { rods, rows, system, freedom, work, .. } = scratch;
+    let Coupling { entries, dense, sparse, cone, right: more, many, change, b, .. } = &mut rows.solver;
+    respond(rods, system, freedom, &mut rows.border, right);
+    *work += 100.0 * right.len() as f64;
+    if entries.is_empty() {
+        return;
+    }
+    change.clear();
+    change.resize(b.len(), 0.0);
+    shift(entries, &rows.border, right, change);
+    let solved = if *many { cone.response(sparse, change) } else { cone.response(dense, change) };
+    if !solved {
+        return;
+    }
+    more.clear();
+    more.resize(right.len(), DVec3::ZERO);
+    load(entries, change, &mut rows.border, more);
+    respond(rods, system, freedom, &mut rows.border, more);
+    for (z, r) in right.iter_mut().zip(more.iter()) {
+        *z += *r;
+    }
+}
+
+/// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the step of both.
+pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
+    let Scratch { rods, rows, system, step, freedom, work, .. } = scratch;
+    let Coupling { entries, dense, sparse, cone, right: more, many, limits, change, steps, b, mu, force, left, smallest, .. } = &mut rows.solver;
+    steps.clear();
+    rows.border.swap_steps(steps);
+    respond(rods, system, freedom, &mut rows.border, right);
+    if !entries.is_empty() {
+        shift(entries, &rows.border, right, b);
+        change.clone_from(force);
+        *work += limits.work;
+        *left = if *many { cone.solve(sparse, b, mu, force, limits) } else { cone.solve(dense, b, mu, force, limits) } / *smallest;
+        *work -= cone.left().max(0.0);
+        for (c, f) in change.iter_mut().zip(force.iter()) {
+            *c = f - *c;
+        }
+        more.clear();
+        more.resize(right.len(), DVec3::ZERO);
+        load(entries, change, &mut rows.border, more);
+        respond(rods, system, freedom, &mut rows.border, more);
+        for (z, r) in right.iter_mut().zip(more.iter()) {
+            *z += *r;
+        }
+        hand_over(entries, force, &mut rows.threads, &mut rows.shapes);
+    }
+    rows.border.add_steps(steps);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
+    }
+}
+
+/// Tells the rows their forces.
+fn hand_over(entries: &mut [Entry], force: &[f64], threads: &mut [thread::ThreadRow], shapes: &mut [shape::ShapeRow]) {
+    for (entry, f) in entries.iter_mut().zip(force.chunks_exact(3)) {
+        entry.force = DVec3::from_slice(f);
+        match entry.source {
+            Source::Thread(k) => threads[k as usize].force = entry.force,
+            Source::Shape(k) => shapes[k as usize].solved(entry.force),
+        }
     }
 }
 

@@ -72,6 +72,7 @@ pub(crate) struct Dense {
     pub s: Vec<f64>,
     /// The working set as factored.
     unknowns: Vec<Unknown>,
+    following: Vec<Unknown>,
     factor: Ldl,
     right: Vec<f64>,
     row: Vec<f64>,
@@ -115,6 +116,19 @@ impl Dense {
         let mut have = core::mem::take(&mut self.have);
         have.clear();
         have.resize(m, 0u8);
+        // Taking out one after the other pays while they are few.
+        let len = self.unknowns.len() as f64;
+        let (mut apart, mut gone) = (0.0, 0.0);
+        for (k, unknown) in self.unknowns.iter().enumerate() {
+            if !self.stands(set, unknown, stale) {
+                apart += 0.5 * (len - k as f64).powi(2) + 0.5 * len * len;
+                gone += 1.0;
+            }
+        }
+        if gone > 0.0 && apart > (len - gone).powi(3) / 6.0 {
+            self.unknowns.clear();
+            self.factor.clear();
+        }
         for k in (0..self.unknowns.len()).rev() {
             let unknown = self.unknowns[k];
             let bit = if unknown.kind == Kind::Component(0) { 1 } else { 2 };
@@ -147,9 +161,20 @@ impl Dense {
     }
 
     fn push(&mut self, unknown: Unknown) -> bool {
-        let row = unknown.row(&self.s, self.n, &mut self.row);
         self.spent += 0.5 * (self.unknowns.len() as f64).powi(2);
-        let pushed = self.factor.push(self.unknowns.iter().map(|u| u.of(row)).chain([unknown.of(row) + unknown.turn]));
+        let Dense { n, s, factor, unknowns, .. } = self;
+        let row = |a: usize| &s[(unknown.contact + a) * *n..(unknown.contact + a + 1) * *n];
+        let pushed = match unknown.kind {
+            Kind::Component(a) => {
+                let row = row(a);
+                factor.push(unknowns.iter().map(|u| u.of(row)).chain([unknown.of(row)]))
+            }
+            Kind::Turn(y, z) => {
+                let (first, second) = (row(1), row(2));
+                let of = |u: &Unknown| y * u.of(first) + z * u.of(second);
+                factor.push(unknowns.iter().map(of).chain([of(&unknown) + unknown.turn]))
+            }
+        };
         if pushed {
             self.unknowns.push(unknown);
         }
@@ -201,15 +226,18 @@ impl Delassus for Dense {
 
     fn solve_following(&mut self, set: &WorkingSet, b: &[f64], mu: &[f64], forces: &mut [f64]) -> bool {
         // A pressed contact's friction only.
-        let mut unknowns = core::mem::take(&mut self.unknowns);
-        let factored = unknowns.len();
-        for k in 0..factored {
-            let now = unknowns[k].now(set);
-            if set.pressed[now.contact / 3] {
-                unknowns.push(now);
+        let mut unknowns = core::mem::take(&mut self.following);
+        unknowns.clear();
+        for c in (0..self.n / 3).filter(|c| set.pressed[*c]) {
+            let contact = 3 * c;
+            unknowns.push(Unknown { contact, kind: Kind::Component(0), turn: 0.0 });
+            match set.friction[c] {
+                Friction::Inside => unknowns.extend([1, 2].map(|a| Unknown { contact, kind: Kind::Component(a), turn: 0.0 })),
+                Friction::Rim(y, z, turn) => unknowns.push(Unknown { contact, kind: Kind::Turn(-z, y), turn }),
+                Friction::None => {}
             }
         }
-        let following = &unknowns[factored..];
+        let following = &unknowns[..];
         let k = following.len();
         self.spent += (k * k * k) as f64 / 3.0;
         self.matrix.clear();
@@ -237,8 +265,7 @@ impl Delassus for Dense {
                 }
             }
         }
-        unknowns.truncate(factored);
-        self.unknowns = unknowns;
+        self.following = unknowns;
         solved
     }
 

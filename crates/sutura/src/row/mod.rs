@@ -6,6 +6,7 @@ pub(crate) mod cone;
 pub(crate) mod couple;
 pub(crate) mod delassus;
 pub(crate) mod dense;
+pub(crate) mod follow;
 pub(crate) mod ldl;
 pub(crate) mod pushed;
 pub(crate) mod shape;
@@ -32,6 +33,7 @@ pub(crate) struct Rows {
     pub welds: weld::Welds,
     pub border: border::Border,
     pub solver: couple::Coupling,
+    pub follow: follow::Follow,
     fresh: Vec<thread::ThreadRow>,
     fresh_shapes: Vec<shape::ShapeRow>,
 }

@@ -9,6 +9,7 @@
 //! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
 //! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. Both forces act
 //! at the centerline.
+//! The friction of rows that slide follows their normal forces within each iteration ([`follow`](crate::row::follow)).
 //! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active set): one that slides and
 //! is pushed back against its friction has stopped. Going by the trial force alone it would slide the other way then, and to and fro,
 //! since the spring is 10^4 times and more stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
@@ -78,6 +79,9 @@ pub(crate) struct ShapeRow {
     /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
     mode: Mode,
+    /// Direction of its friction while it slides, and what the size of that has grown by since the matrix was put together \[N\].
+    rim: DVec3,
+    followed: f64,
     /// How often it slid and stopped in this substep.
     stops: u32,
     /// Stiffness of a firm row as last assembled, and the force that the step after it predicted.
@@ -144,6 +148,37 @@ impl ShapeRow {
         self.friction = self.anchor;
         self.firm = self.carried > self.least;
         self.mode = Some(self.friction).filter(|_| self.sliding).and_then(DVec3::try_normalize).map_or(Mode::Sticks, Mode::Slides);
+    }
+
+    /// Whether it is a firm row that slides.
+    pub fn slides(&self) -> bool {
+        self.firm && self.rim != DVec3::ZERO
+    }
+
+    /// What its friction is too small by where the step leads, and whether it presses there.
+    pub fn missing(&self, step: &[DVec3], sliders: &Sliders, border: &Border) -> (f64, bool) {
+        let pressed = self.normal_force - self.stiffness * self.normal.dot(moved(self, step, sliders, border));
+        (self.mu() * (pressed.max(0.0) - self.pressed) - self.followed, pressed > 0.0)
+    }
+
+    /// What the limit of its friction gains by a step.
+    pub fn gained(&self, step: &[DVec3], sliders: &Sliders, border: &Border) -> f64 {
+        -self.mu() * self.stiffness * self.normal.dot(moved(self, step, sliders, border))
+    }
+
+    /// Makes its friction larger.
+    pub fn grow(&mut self, by: f64) {
+        self.followed += by;
+    }
+
+    /// Adds a friction force of this size, and its reaction, to right sides.
+    pub fn push(&self, size: f64, right: &mut [DVec3], sliders: &Sliders, border: &mut Border) {
+        let (e, force) = (self.element as usize, self.rim * size);
+        right[2 * e] += force * (1.0 - self.s);
+        right[2 * e + 2] += force * self.s;
+        if let Some(k) = sliders.find(self.shape) {
+            border.load(k, -sliders.direction(k).dot(force));
+        }
     }
 
     /// Normal and two tangents.
@@ -246,6 +281,8 @@ impl Site<'_> {
             normal_force: 0.0,
             friction: DVec3::ZERO,
             mode: Mode::Sticks,
+            rim: DVec3::ZERO,
+            followed: 0.0,
             stops: 0,
             pressed: 0.0,
             tangent: DMat3::ZERO,
@@ -492,6 +529,7 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
     match row.mode {
         Mode::Sticks => {
             row.friction = trial;
+            row.rim = DVec3::ZERO;
             DMat3::from_diagonal(DVec3::splat(k))
         }
         Mode::Slides(before) => {
@@ -500,6 +538,7 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
             let forward = size > limit && trial.dot(before) > 0.0;
             let direction = if forward { trial / size } else { (before - n * n.dot(before)).normalize_or_zero() };
             row.friction = direction * limit;
+            row.rim = direction;
             let aside = if forward { k * limit / size } else { k };
             outer(n, n) * k + (DMat3::IDENTITY - outer(n, n) - outer(direction, direction)) * aside
         }
@@ -546,6 +585,7 @@ pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, firs
         system.after[2 * e] += stiffness * (a * b);
         rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &mut rows.border);
         row.tangent = stiffness;
+        row.followed = 0.0;
     }
 }
 
@@ -560,7 +600,7 @@ pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
     let Scratch { rows, step, .. } = scratch;
     let (sliders, border) = (&rows.sliders, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
-        row.expected = row.normal * row.normal_force + row.friction - row.tangent * moved(row, step, sliders, border) * scale;
+        row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale) - row.tangent * moved(row, step, sliders, border) * scale;
     }
 }
 
@@ -627,7 +667,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 decide(&mut now, trial);
                 forces(&mut now, trial);
                 // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the next substep.
-                let friction = if row.mode == Mode::Sticks { trial } else { row.friction };
+                let friction = if row.mode == Mode::Sticks { trial } else { row.friction + row.rim * row.followed };
                 let normal_force = (row.normal_force - row.stiffness * (now.gap - row.gap)).max(0.0);
                 let off = (now.normal_force - normal_force).abs().max((now.friction - friction).length());
                 // Where one after another goes over its limit the last digit would take an iteration each.

@@ -325,19 +325,22 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
     }
 }
 
-/// Factor on the update so that no pair of centerlines comes nearer in one iteration than most of the way to the least distance allowed.
+/// Factor on the update so that no pair of centerlines comes nearer than half of the least distance allowed on the straight way from the start of the substep to
+/// where the update leads; a pair that would goes most of the way there. (Only that way counts, as where a substep is accepted: a prediction may have brought two
+/// pieces into or past each other, and the way back is free.)
 pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
-    let x = &state.position;
-    let step = &scratch.step;
+    let (x, start, step) = (&state.position, &scratch.start, &scratch.step);
     let mut scale = scale;
     for (a, b) in &scratch.candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
-        let d = |i: usize| step[2 * i];
-        let m = |i: usize, j: usize| (d(i) - d(j)).length_squared();
-        let moved = m(a, b).max(m(a, b + 1)).max(m(a + 1, b)).max(m(a + 1, b + 1)).sqrt() * scale;
-        let (ra, rb) = (scratch.radius[a], scratch.radius[b]);
-        let sum = ra + rb;
+        let corners = [a, a + 1, b, b + 1];
+        let moved = largest_between(corners.map(|i| step[2 * i] * scale));
+        let sum = scratch.radius[a] + scratch.radius[b];
         if moved < 0.2 * sum {
+            continue;
+        }
+        let from = corners.map(|i| start[i]);
+        if keeps_apart(from, corners.map(|i| x[i] + step[2 * i] * scale - start[i]), sum) {
             continue;
         }
         let c = segment::closest(x[a], x[a + 1], x[b], x[b + 1]).apart.length();
@@ -347,6 +350,30 @@ pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
         }
     }
     scale
+}
+
+/// Largest difference of a vector at the ends of one element and one at those of another.
+fn largest_between(v: [DVec3; 4]) -> f64 {
+    let apart = |i: usize, j: usize| (v[i] - v[j]).length_squared();
+    apart(0, 2).max(apart(0, 3)).max(apart(1, 2)).max(apart(1, 3)).sqrt()
+}
+
+/// Whether the centerlines of two elements stay half of `sum` apart on a straight way (conservative advancement).
+fn keeps_apart(from: [DVec3; 4], way: [DVec3; 4], sum: f64) -> bool {
+    let moved = largest_between(way);
+    let mut u = 0.0;
+    for _ in 0..20 {
+        let at = |i: usize| from[i] + way[i] * u;
+        let free = segment::closest(at(0), at(1), at(2), at(3)).apart.length() - 0.5 * sum;
+        if free < 0.1 * sum {
+            return false;
+        }
+        u += free / moved;
+        if u >= 1.0 {
+            return true;
+        }
+    }
+    false
 }
 
 /// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was added, or when one was left out of the small problem.

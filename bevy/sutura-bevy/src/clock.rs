@@ -1,6 +1,7 @@
 //! Frames of physics in real time.
 
 use bevy::ecs::schedule::ScheduleLabel;
+use crate::world::Sutura;
 use bevy::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -37,6 +38,9 @@ pub struct PhysicsClock {
     pub budget: Duration,
     /// Where all the rest of a drawn frame takes longer than `budget`, physics may take as long, but not longer than this: so slow pictures slow no physics.
     pub share: Duration,
+    /// Most time that a frame of physics may take, where it may not take as long as it needs. One that needs longer ends early, at a state as good as any: slow
+    /// motion, but no picture that waits. What it does then depends on how fast the machine is; a recording of the input plays it back as it was.
+    pub most_frame: Option<Duration>,
     /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
     /// running after a debt that only grows.
     pub most_owed: f64,
@@ -71,6 +75,7 @@ impl Default for PhysicsClock {
             by_hand: 0,
             budget: Duration::from_millis(200),
             share: Duration::ZERO,
+            most_frame: None,
             most_owed: 1.0,
             owed: 0.0,
             lost: 0.0,
@@ -128,14 +133,16 @@ pub(crate) fn advance(world: &mut World) {
     let due = clock.pass(elapsed);
     clock.now = 0;
     let begin = Instant::now();
+    let mut passed = 0.0;
     let budget = clock.done.map_or(clock.budget, |done| clock.budget.max((begin - done).min(clock.share)));
     for k in 0..due {
         if k > 0 && begin.elapsed() > budget {
             break;
         }
         world.resource_mut::<PhysicsClock>().remaining = due - k;
-        let start = Instant::now();
+        let (start, from) = (Instant::now(), simulated(world));
         world.run_schedule(PhysicsFrame);
+        passed += simulated(world) - from;
         let mut clock = world.resource_mut::<PhysicsClock>();
         clock.ms = start.elapsed().as_secs_f64() * 1e3;
         clock.now += 1;
@@ -150,8 +157,13 @@ pub(crate) fn advance(world: &mut World) {
         // A mean over about a second, or what there is of it.
         let weight = elapsed / (elapsed + clock.watched);
         clock.watched = (clock.watched + elapsed).min(1.0);
-        clock.rate += weight * (f64::from(clock.now) * clock.frame / elapsed - clock.rate);
+        clock.rate += weight * (passed / elapsed - clock.rate);
     }
+}
+
+/// Time of the world \[s\]: a frame of physics that ends early simulates less than its length.
+fn simulated(world: &World) -> f64 {
+    world.get_resource::<Sutura>().map_or(0.0, |s| s.world().time())
 }
 
 #[cfg(test)]

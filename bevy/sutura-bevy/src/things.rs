@@ -354,7 +354,7 @@ pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bod
             led.push((Part::Body(handle), pose, next));
         }
     }
-    sutura.step(dt, &mut |world, part| {
+    sutura.step(dt, clock.most_frame, &mut |world, part| {
         for (what, from, to) in &led {
             let pose = between(*from, *to, part);
             let _ = match what {

@@ -2,6 +2,7 @@
 
 use bevy::prelude::*;
 use std::any::Any;
+use std::time::{Duration, Instant};
 use sutura::input::{Recorder, Recording};
 use sutura::{Handle, Incident, Rod, Settings, Shape, World};
 
@@ -25,6 +26,8 @@ pub trait Simulation: Any + Send + Sync {
     /// One frame of physics of `dt` \[s\]. It may be done in pieces; before each `drive` is to be called with the part of the frame that will be
     /// done with that piece, in (0, 1]. What went wrong comes back.
     fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident>;
+    /// Limits the work of each frame from now on, or no longer ([`World::set_step_work`]): one that has spent it ends early, with less time simulated.
+    fn limit_work(&mut self, most: Option<f64>);
     /// A hand takes a thing that was in the world before (`held`), or lets go of it. Whether the simulation sees to what moves it from then on; else a
     /// body that is let go is moved by what moved it before.
     fn hold(&mut self, _part: Part, _held: bool) -> bool {
@@ -50,6 +53,13 @@ impl Simulation for Recorder {
         drive(self, 1.0);
         Recorder::step(self, dt).incidents
     }
+    fn limit_work(&mut self, most: Option<f64>) {
+        let most = most.filter(|most| *most > 0.0);
+        if most != self.step_work() {
+            // Refused is only what is no number > 0.
+            let _ = self.set_step_work(most);
+        }
+    }
 }
 
 /// The world of the engine, lengths in meters, and what it said of its last frame.
@@ -58,7 +68,18 @@ pub struct Sutura {
     simulation: Box<dyn Simulation>,
     /// What went wrong in the last frame of physics. A step never fails: where it found no way it stands still and says so here.
     pub incidents: Vec<Incident>,
+    /// Work in a millisecond, as measured lately.
+    work_per_ms: f64,
 }
+
+/// Work in a millisecond that is expected before any is measured.
+const WORK_PER_MS: f64 = 1e6;
+
+/// Work of a frame from which on its time says what work takes.
+const TELLING: f64 = 1e6;
+
+/// Part of a measured rate that the next frame goes by.
+const NEWEST: f64 = 0.1;
 
 impl Default for Sutura {
     fn default() -> Self {
@@ -73,7 +94,7 @@ impl Sutura {
     }
     /// A world of one's own.
     pub fn of(simulation: impl Simulation) -> Self {
-        Sutura { simulation: Box::new(simulation), incidents: Vec::new() }
+        Sutura { simulation: Box::new(simulation), incidents: Vec::new(), work_per_ms: WORK_PER_MS }
     }
     /// Reads the world.
     pub fn world(&self) -> &World {
@@ -103,7 +124,15 @@ impl Sutura {
     pub(crate) fn grip_at(&self, thread: Handle<Rod>, particle: usize) -> Option<Handle<sutura::Grip>> {
         self.simulation.grip_at(thread, particle)
     }
-    pub(crate) fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) {
+    /// A frame of physics of `dt` \[s\], which ends early where it would take longer than `most`. The engine counts work; what a count takes here is measured.
+    pub(crate) fn step(&mut self, dt: f64, most: Option<Duration>, drive: &mut dyn FnMut(&mut Recorder, f64)) {
+        let most = most.map(|most| most.as_secs_f64() * 1e3 * self.work_per_ms);
+        self.simulation.limit_work(most);
+        let (before, start) = (self.world().work_done(), Instant::now());
         self.incidents = self.simulation.step(dt, drive);
+        let (work, ms) = (self.world().work_done() - before, start.elapsed().as_secs_f64() * 1e3);
+        if work > TELLING && ms > 0.0 {
+            self.work_per_ms += NEWEST * (work / ms - self.work_per_ms);
+        }
     }
 }

@@ -70,6 +70,7 @@ pub fn window(args: &Args) -> AppExit {
     // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second, and half of a slower one.
     app.world_mut().resource_mut::<PhysicsClock>().budget = std::time::Duration::from_millis(22);
     app.world_mut().resource_mut::<PhysicsClock>().share = std::time::Duration::from_millis(200);
+    app.world_mut().resource_mut::<PhysicsClock>().most_frame = Some(std::time::Duration::from_millis(14));
     let (name, zoom) = (args.scene.clone(), args.zoom as f32);
     app.add_systems(PostStartup, (move |world: &mut World| control::open(world, &name), spawn_camera).chain());
     app.world_mut().resource_mut::<Viewer>().least_width = args.least_width;

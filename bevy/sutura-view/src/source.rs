@@ -45,6 +45,9 @@ impl Simulation for Play {
         self.0.step_frame_with(drive);
         Vec::new()
     }
+    fn limit_work(&mut self, most: Option<f64>) {
+        self.0.limit_work(most);
+    }
     fn hold(&mut self, part: Part, held: bool) -> bool {
         let Some(what) = self.mover(part) else { return false };
         if held {

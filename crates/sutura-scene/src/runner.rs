@@ -57,6 +57,20 @@ pub struct Runner {
     cpu: Vec<f64>,
     /// Frames in a row in which no good substep was found.
     stuck: u32,
+    /// Most work of a call that simulates a frame, and what was done of a frame that it left unfinished.
+    most_work: Option<f64>,
+    under_way: Option<UnderWay>,
+    /// Solver time of the last call \[s\].
+    last_cpu: f64,
+}
+
+/// A frame that was left unfinished.
+struct UnderWay {
+    report: FrameReport,
+    /// Time of it that is done \[s\].
+    done: f64,
+    cpu: Duration,
+    stuck: bool,
 }
 
 type IncidentKey = Option<std::mem::Discriminant<IncidentKind>>;
@@ -72,8 +86,10 @@ pub struct Progress {
     pub fraction: f64,
     /// Name of the phase under way (the last one when finished).
     pub phase: String,
-    /// Solver time of this frame \[ms\].
+    /// Solver time of this call \[ms\].
     pub ms: f64,
+    /// Whether the frame is not finished, since the call had spent its work ([`Runner::limit_work`]): the next call goes on with it.
+    pub cut: bool,
     /// Whether the run is over; further calls do nothing.
     pub finished: bool,
 }
@@ -115,6 +131,7 @@ impl Runner {
             ("rejected", ""),
             ("newton", ""),
             ("contacts", ""),
+            ("work", ""),
         ];
         let mut runner = Runner {
             world_start: stage.world.time(),
@@ -142,6 +159,9 @@ impl Runner {
             max_tension: vec![f64::NEG_INFINITY; n],
             cpu: Vec::new(),
             stuck: 0,
+            most_work: None,
+            under_way: None,
+            last_cpu: 0.0,
             scene,
             stage,
         };
@@ -162,6 +182,13 @@ impl Runner {
         Ok(runner)
     }
 
+    /// Limits the work of each call that simulates a frame, in the counts of [`StepReport::work`](sutura::StepReport::work). Where it is spent the call
+    /// returns, with the last substep that was accepted, and the next call goes on with the frame: slow motion, but no call that takes long. It is counted, so a
+    /// recording of the input plays it back as it was.
+    pub fn limit_work(&mut self, most: Option<f64>) {
+        self.most_work = most;
+    }
+
     /// Simulates one frame, or what there is of the last one where a condition ends the run within it. Does nothing once the run is finished.
     pub fn step_frame(&mut self) -> Progress {
         self.step_frame_with(&mut |_, _| {})
@@ -171,7 +198,7 @@ impl Runner {
     /// that piece. What it does is recorded like everything else. What the scene moves itself is to be lent before ([`Runner::lend`]).
     pub fn step_frame_with(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Progress {
         if !self.finished {
-            let (report, cpu, stuck) = self.simulate(drive);
+            let Some((report, cpu, stuck)) = self.simulate(drive) else { return self.progress() };
             self.frame += 1;
             if !self.finished {
                 self.stage.time = self.frame as f64 / self.scene.frame_rate;
@@ -203,6 +230,7 @@ impl Runner {
         let mut incidents = Vec::new();
         for k in 1..=pieces {
             drive(&mut self.stage.world, f64::from(k) / f64::from(pieces));
+            self.allow(self.most_work.map(|most| most / f64::from(pieces)));
             if let Err(e) = self.stage.bring_back(self.stage.time, dt / f64::from(pieces)) {
                 self.incident(None, e.to_string());
             }
@@ -250,19 +278,36 @@ impl Runner {
         if self.stage.is_driven() || self.condition().is_some() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 }
     }
 
-    /// Steps the world through one frame; its report, the solver's CPU time \[s\], and whether it was stuck.
-    fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> (FrameReport, f64, bool) {
+    /// Steps the world through one frame, or the rest of it; its report, the solver's CPU time \[s\], and whether it was stuck. None where the work is spent before.
+    fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Option<(FrameReport, f64, bool)> {
         let dt = 1.0 / self.scene.frame_rate;
         let begin = self.frame as f64 * dt;
-        let mut report = FrameReport { converged: true, ..FrameReport::default() };
-        let (mut cpu, mut stuck) = (Duration::ZERO, false);
-        // Of the frame this was done under phases that ended in it; the rest is done in pieces.
-        let (mut done, mut pieces, mut k) = (0.0, self.pieces(dt), 0);
+        let fresh = || UnderWay { report: FrameReport { converged: true, ..FrameReport::default() }, done: 0.0, cpu: Duration::ZERO, stuck: false };
+        let UnderWay { mut report, done: begun, mut cpu, mut stuck } = self.under_way.take().unwrap_or_else(fresh);
+        let (before_call, work_before) = (cpu, self.stage.world.work_done());
+        // Work of the piece before, in this call.
+        let mut last_piece = 0.0;
+        // Of the frame this was done before, or under phases that ended in it; the rest is done in pieces.
+        let (mut done, mut pieces, mut k) = (begun, self.pieces(dt - begun), 0);
         while k < pieces {
             k += 1;
             let (rest, part) = (dt - done, f64::from(k) / f64::from(pieces));
             let (at, piece) = (begin + done + rest * f64::from(k) / f64::from(pieces), rest / f64::from(pieces));
-            let before = done / dt;
+            // Of what this call has to do.
+            let before = (done - begun) / (dt - begun);
+            let begin_piece = done + rest * f64::from(k - 1) / f64::from(pieces);
+            if let Some(most) = self.most_work {
+                let left = most - (self.stage.world.work_done() - work_before);
+                // Rather less than what would be thrown away. A piece that is begun may take half of all, for what it needs then is no chance.
+                if left < last_piece && begin_piece > begun {
+                    self.last_cpu = (cpu - before_call).as_secs_f64();
+                    self.under_way = Some(UnderWay { report, done: begin_piece, cpu, stuck });
+                    return None;
+                }
+                self.allow(Some(left.max(0.5 * most)));
+            } else {
+                self.allow(None);
+            }
             drive(&mut self.stage.world, if k == pieces { 1.0 } else { before + (1.0 - before) * part });
             let moved = self.stage.drive(at);
             if let Err(e) = moved.and(self.stage.bring_back(at, piece)) {
@@ -282,7 +327,8 @@ impl Runner {
             };
             cpu += clock.elapsed().saturating_sub(audited);
             report.add(&step);
-            report.wanted += piece;
+            last_piece = step.work;
+            report.wanted += if step.cut { step.simulated } else { piece };
             for incident in &step.incidents {
                 if let IncidentKind::Overlap(overlap) = &incident.kind {
                     let message = self.overlap(overlap);
@@ -293,6 +339,12 @@ impl Runner {
                 self.stage.incidents += 1;
                 self.incident(Some(&incident.kind), incident.kind.to_string());
             }
+            if step.cut {
+                let now = begin_piece + step.simulated;
+                self.last_cpu = (cpu - before_call).as_secs_f64();
+                self.under_way = Some(UnderWay { report, done: now, cpu, stuck });
+                return None;
+            }
             // At the end of the frame the condition has its turn after probes and checks.
             if k < pieces && self.condition_ends_phase(at, piece, &report) {
                 if self.finished {
@@ -302,7 +354,18 @@ impl Runner {
                 (pieces, k) = (self.pieces(dt - done), 0);
             }
         }
-        (report, cpu.as_secs_f64(), stuck)
+        self.last_cpu = (cpu - before_call).as_secs_f64();
+        Some((report, cpu.as_secs_f64(), stuck))
+    }
+
+    /// Limits the work of the next step, or no longer.
+    fn allow(&mut self, most: Option<f64>) {
+        let most = most.map(|most| most.max(1.0));
+        if most != self.stage.world.step_work()
+            && let Err(e) = self.stage.world.set_step_work(most)
+        {
+            self.incident(None, e.to_string());
+        }
     }
 
     /// The condition that the phase waits for, and the time before which it does not count \[s\].
@@ -449,6 +512,7 @@ impl Runner {
             f64::from(report.rejected),
             f64::from(report.newton_iterations),
             f64::from(report.contacts),
+            report.work,
         ]);
     }
 
@@ -594,10 +658,11 @@ impl Runner {
         let phase = &self.scene.phases[self.phase.min(self.scene.phases.len() - 1)];
         Progress {
             frame: self.frame,
-            time: self.stage.time,
+            time: self.stage.time + self.under_way.as_ref().map_or(0.0, |u| u.done),
             fraction: if self.finished { 1.0 } else { (done + here) / total },
             phase: phase.name.clone(),
-            ms: self.cpu.last().map_or(0.0, |s| s * 1e3),
+            ms: self.last_cpu * 1e3,
+            cut: self.under_way.is_some(),
             finished: self.finished,
         }
     }

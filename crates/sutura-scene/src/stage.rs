@@ -107,6 +107,7 @@ pub struct FrameReport {
     pub thread_clearance: Option<f64>,
     pub shape_clearance: Option<f64>,
     pub contacts: u32,
+    pub work: f64,
 }
 
 impl FrameReport {
@@ -121,6 +122,7 @@ impl FrameReport {
         self.thread_clearance = lesser(self.thread_clearance, step.thread_clearance);
         self.shape_clearance = lesser(self.shape_clearance, step.shape_clearance);
         self.contacts = step.contacts;
+        self.work += step.work;
     }
     pub fn clearance(&self) -> Option<f64> {
         lesser(self.thread_clearance, self.shape_clearance)

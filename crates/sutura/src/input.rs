@@ -70,6 +70,8 @@ pub enum Input {
     SetReel(Handle<Reel>, ReelLaw),
     /// [`World::restore`].
     Restore(Vec<u8>),
+    /// [`World::set_step_work`].
+    StepWork(Option<f64>),
     /// [`World::step`] by a time \[s\], and the state hash that it left.
     Step(f64, u64),
 }
@@ -100,6 +102,7 @@ impl Input {
             Input::InsertReel(spec) => drop(world.insert_reel(spec)?),
             Input::SetReel(reel, law) => world.set_reel(*reel, *law)?,
             Input::Restore(bytes) => world.restore(bytes)?,
+            Input::StepWork(most) => world.set_step_work(*most)?,
             Input::Step(dt, _) => return Ok(Some(world.step(*dt))),
         }
         Ok(None)
@@ -183,6 +186,8 @@ impl Recorder {
         insert_reel(spec: &ReelSpec) -> Handle<Reel>, Input::InsertReel(spec.clone());
         /// [`World::set_reel`].
         set_reel(reel: Handle<Reel>, law: ReelLaw) -> (), Input::SetReel(reel, law);
+        /// [`World::set_step_work`].
+        set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
         restore(bytes: &[u8]) -> (), Input::Restore(bytes.to_vec());
     }
@@ -466,4 +471,5 @@ variants!(Input {
     20 => SetReel(reel, law),
     21 => SetMaterial(rod, material),
     22 => SetStretch(rod, stretch),
+    23 => StepWork(most),
 });

@@ -74,9 +74,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let (mut gained, mut scale) = (0.0_f64, 1.0);
     // Way that was to go some iterations ago, in radii, and iterations in a row whose contact problem was not solved.
     let (mut way, mut unsolved) = (f64::INFINITY, 0);
-    while out.iterations < settings.newton_max && !scratch.exhausted() {
+    while out.iterations < settings.newton_max && !scratch.exhausted() && !scratch.late() {
         out.iterations += 1;
-        scratch.work += 300.0 * model.mass.len() as f64 + 100.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
+        scratch.work += 600.0 * model.mass.len() as f64 + 200.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
         row::shape::review(model, state, scratch, out.iterations == 1);
         brake::review(model, state, &mut scratch.brakes);
         row::couple::zones(scratch);

@@ -10,8 +10,13 @@ use crate::model::rod::Rod;
 pub struct StepReport {
     /// Simulated time at the end \[s\].
     pub time: f64,
-    /// Of the time wanted, what was simulated \[s\]; the rest passed with everything at rest, as where no acceptable substep was found.
+    /// Of the time wanted, what was simulated \[s\]. The rest passed with everything at rest, as where no acceptable substep was found; where the step was `cut` it
+    /// did not pass.
     pub simulated: f64,
+    /// Whether it ended early, since it had spent its work ([`World::set_step_work`](crate::World::set_step_work)).
+    pub cut: bool,
+    /// Work that it took, in rough counts of multiply-adds.
+    pub work: f64,
     /// Substeps accepted.
     pub substeps: u32,
     /// Substeps thrown away and done again: as two halves, or with a thread that stretches where it cannot keep its length.
@@ -52,7 +57,7 @@ pub enum Rejection {
     NotFinite,
     /// Newton's iteration did not converge.
     NotConverged,
-    /// Its solution would take more work than a substep may.
+    /// Its solution would take more work than a substep may, or than the step has left.
     TooMuchWork,
     /// An inextensible thread cannot keep its length.
     LengthNotKept,

@@ -119,8 +119,14 @@ pub(crate) struct Scratch {
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
 
-    /// Work of the substep so far, in rough counts of multiplications: counted, not timed.
+    /// Work of the substep so far, in rough counts of multiplications: counted, not timed. And that of the substeps before in this step, of the last one accepted,
+    /// and what the step may take.
     pub work: f64,
+    pub spent: f64,
+    pub last_work: f64,
+    pub allowed: f64,
+    /// Whether the step ends here, since that is spent.
+    pub cut: bool,
     /// Rods that the last attempt was refused for, and rods that are held where they were, from when, for the rest of the step.
     pub refused: Option<[u32; 2]>,
     pub held: Vec<(u32, f64)>,
@@ -135,6 +141,10 @@ impl Scratch {
     /// Whether the substep has taken all the work that it may.
     pub fn exhausted(&self) -> bool {
         self.work > crate::params::SUBSTEP_WORK
+    }
+    /// Whether the step has taken all that it may.
+    pub fn late(&self) -> bool {
+        self.spent + self.work > self.allowed
     }
     /// Axial stiffness of an element \[N/m\], and its axial force at its rest length \[N\].
     #[inline(always)]

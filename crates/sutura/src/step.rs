@@ -41,6 +41,10 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     report.converged = true;
     scratch.held.clear();
     state.time = interval.start;
+    (scratch.work, scratch.spent, scratch.last_work, scratch.cut) = (0.0, 0.0, 0.0, false);
+    // Where shorter and shorter substeps found no way within what a step may take, one is found now, whatever it takes.
+    let starved = state.last_h > 0.0 && state.last_h < model.settings.substep * STARVED;
+    scratch.allowed = model.step_work.filter(|_| !starved).unwrap_or(f64::INFINITY);
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
             scratch.fit(model);
@@ -48,7 +52,7 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
             // Who looks from state to state must not lose sight of the motion to come.
             (interval.observe)(View { model, state });
         }
-        scratch.work = 0.0;
+        scratch.spent += core::mem::take(&mut scratch.work);
         advance(model, state, scratch, interval, interval.start + h * f64::from(k), h, 0, report)
     });
     tell_lengths(model, state, report);
@@ -59,7 +63,10 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
         grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
     }
     report.simulated = reached * interval.length;
-    state.time = interval.start + interval.length;
+    (report.work, report.cut) = (scratch.spent + scratch.work, scratch.cut);
+    if !scratch.cut {
+        state.time = interval.start + interval.length;
+    }
 }
 
 /// Tension over E A that no inextensible thread keeps its length under: no thread bears as much.
@@ -80,6 +87,12 @@ const GIVE_WAY: u32 = 4;
 /// Accepted substeps of one length before twice the length is tried again.
 const CALM: u32 = 6;
 
+/// Substep over the one that is wanted, below which a step finds one whatever it takes.
+const STARVED: f64 = 1.0 / 48.0;
+
+/// Part of what a step may take that a substep which found no end in it took, for the next step to try half of it.
+const TOO_LONG: f64 = 0.5;
+
 /// Advances from `t` by `h`, or in two halves when the result is not acceptable. False when it got stuck.
 #[allow(clippy::too_many_arguments, reason = "the recursion on halves hands all of them on")]
 fn advance(
@@ -98,6 +111,12 @@ fn advance(
         return advance(model, state, scratch, interval, t, half, depth + 1, report)
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
+    // Rather less than what would be thrown away.
+    if report.substeps > 0 && scratch.spent + scratch.work + scratch.last_work > scratch.allowed {
+        scratch.cut = true;
+        return false;
+    }
+    let before = scratch.spent + scratch.work;
     save(state, scratch, depth);
     let reels = reel::turn(model, state, h);
     if reels {
@@ -122,6 +141,8 @@ fn advance(
                     state.onset = Onset::Smooth;
                 }
             }
+            scratch.last_work = scratch.spent + scratch.work - before;
+            scratch.allowed = model.step_work.unwrap_or(f64::INFINITY);
             let last = state.last_h;
             state.last_h = if depth == 0 { 0.0 } else { h };
             state.calm = if h > 1.5 * last { 0 } else { state.calm.saturating_add(1) };
@@ -142,6 +163,13 @@ fn advance(
             let last = depth >= model.settings.halvings || scratch.exhausted();
             restore(state, scratch, depth);
             reel::follow(model, state);
+            if scratch.late() {
+                if scratch.spent + scratch.work - before > TOO_LONG * scratch.allowed {
+                    (state.last_h, state.calm) = (0.5 * h, 0);
+                }
+                scratch.cut = true;
+                return false;
+            }
             let taut = if last || depth >= GIVE_WAY { TAUT } else { UNBEARABLE };
             if let_stretch(model, state, scratch, taut) {
                 return advance(model, state, scratch, interval, t, h, depth, report);

@@ -1,7 +1,7 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
 use crate::collide::overlap::{Overlap, OverlapWith};
-use crate::error::Error;
+use crate::error::{Error, check};
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
@@ -26,6 +26,8 @@ pub struct World {
     model: Model,
     state: State,
     scratch: Scratch,
+    /// Work of all steps so far.
+    work: f64,
 }
 
 /// Force \[N\] and torque \[N m\] in world axes, about the place where they act.
@@ -79,6 +81,29 @@ impl World {
             self.follow_strain(0..self.model.mass.len());
         }
         Ok(())
+    }
+    /// Limits the work of each step from now on, or no longer (`None`, as a world begins).
+    ///
+    /// Work is counted in multiply-adds, roughly: 1e9 are about a second of one core. It is counted and not timed, so what a step does is the same on any
+    /// machine; who wants a frame within a time measures what a count takes there ([`StepReport::work`]). Where a step has spent it, it ends with the last
+    /// substep that was accepted: its state is as good as any, but [`StepReport::simulated`] is less than the time wanted, and the time of the world is less by
+    /// what is missing. Step on by that, or let everything be in slow motion. What grips and driven shapes are wanted to reach is reached in part. A step that
+    /// finds no substep within its limit leaves everything as it was, and the next one tries a shorter substep; after a few such steps one is found, whatever
+    /// it takes. The paper's solver takes no notice.
+    pub fn set_step_work(&mut self, most: Option<f64>) -> Result<(), Error> {
+        if let Some(most) = most {
+            check("world", "step_work", most, most > 0.0, "a finite number > 0")?;
+        }
+        self.model.step_work = most;
+        Ok(())
+    }
+    /// Work of all steps so far, in the counts of [`StepReport::work`].
+    pub fn work_done(&self) -> f64 {
+        self.work
+    }
+    /// The limit on the work of a step.
+    pub fn step_work(&self) -> Option<f64> {
+        self.model.step_work
     }
     /// Friction between two surfaces (indices given in `RodSpec::surface`, `ShapeSpec::surface`).
     pub fn set_friction(&mut self, a: u32, b: u32, friction: Friction) -> Result<(), Error> {
@@ -457,7 +482,7 @@ impl World {
     /// Takes hold.
     pub fn insert_grip(&mut self, spec: &GripSpec) -> Result<Handle<Grip>, Error> {
         spec.drive.validate()?;
-        crate::error::check("grip", "ramp", spec.ramp, spec.ramp >= 0.0, "a finite time >= 0 [s]")?;
+        check("grip", "ramp", spec.ramp, spec.ramp >= 0.0, "a finite time >= 0 [s]")?;
         let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
         spec.place.validate("grip", &self.model, rod)?;
         let n = rod.n_elements;
@@ -769,6 +794,7 @@ impl World {
         let mut interval = crate::step::Interval { start, length: dt, observe };
         crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
         report.time = self.state.time;
+        self.work += report.work;
         self.report_overlaps(&teleported, &mut report);
         if self.model.settings.solver == Solver::Direct {
             report.contacts = self.contacts().count() as u32;

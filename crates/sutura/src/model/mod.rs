@@ -29,6 +29,8 @@ const INEXTENSIBLE: f64 = 1e5;
 #[derive(Default)]
 pub struct Model {
     pub(crate) settings: Settings,
+    /// Most work that a step may take, where it is limited.
+    pub(crate) step_work: Option<f64>,
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
     pub(crate) welds: Slots<WeldModel>,

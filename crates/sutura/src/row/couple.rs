@@ -212,6 +212,9 @@ fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry
     30.0 * n * n + n * n * n / 3.0 > 3.0 * (1500.0 * blocks as f64 + 5000.0 * touched as f64)
 }
 
+/// Multiplications that a contact solve gets although the step has spent what it may.
+const LEAST_WORK: f64 = 1e5;
+
 /// Memory of the coupling.
 #[derive(Default)]
 pub(crate) struct Coupling {
@@ -269,6 +272,7 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
+    let to_spend = scratch.allowed - scratch.spent - scratch.work;
     let Scratch { rods, rows, system, step, freedom, start, start_shape_pose, work, .. } = scratch;
     let start = Start { position: start, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
@@ -292,6 +296,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     *smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
     *many = rows.border.count() == 0 && pays(system, rods, entries, n);
     let most = if *many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
+    // What is left to the step is enough, or the iteration counts for nothing.
+    let most = most.min(to_spend.max(LEAST_WORK));
     *limits = Limits { residual: params::CONTACT_TOLERANCE * *smallest, rounds: 15, steps: 60, work: most };
     // Putting S together, and the most that its solution may take.
     *work += if *many { most } else { 30.0 * (n * n) as f64 + most };

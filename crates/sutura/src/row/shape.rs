@@ -600,7 +600,8 @@ pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
     let Scratch { rows, step, .. } = scratch;
     let (sliders, border) = (&rows.sliders, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
-        row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale) - row.tangent * moved(row, step, sliders, border) * scale;
+        row.expected =
+            row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale) - row.tangent * moved(row, step, sliders, border) * scale;
     }
 }
 

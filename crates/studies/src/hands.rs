@@ -35,9 +35,16 @@ pub struct Hands {
     /// CPU time after which a pair is given up
     #[arg(long, default_value = "5min", value_parser = seconds)]
     pub budget: f64,
+    /// Most work of a frame, in counts of the engine, some 1e9 a second of one core: what needs more is in slow motion
+    #[arg(long, value_name = "COUNTS", value_parser = positive)]
+    pub work: Option<f64>,
     /// Say of each pair how it did when it has
     #[arg(long, short)]
     pub verbose: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| format!("{text} is not a number > 0"))
 }
 
 /// Seed of all of them.
@@ -241,6 +248,7 @@ impl Played {
         vec![
             name,
             format!("{:.2}", self.time),
+            format!("{:.1}", 100.0 * (1.0 - self.time / (self.ms.len() as f64 * FRAME))),
             self.passages.to_string(),
             if kinds.is_empty() { "none".into() } else { kinds.join(", ") },
             self.strained.to_string(),
@@ -257,9 +265,10 @@ impl Played {
     }
 }
 
-const COLUMNS: [&str; 14] = [
+const COLUMNS: [&str; 15] = [
     "hands",
     "simulated s",
+    "slow motion %",
     "passages",
     "incidents",
     "frames at the hand's limit",
@@ -274,12 +283,15 @@ const COLUMNS: [&str; 14] = [
     "ended, first passage, first incident",
 ];
 
-fn play(number: u64, time: f64, budget: f64, trace: &mut dyn FnMut(String)) -> Played {
+fn play(number: u64, time: f64, budget: f64, work: Option<f64>, trace: &mut dyn FnMut(String)) -> Played {
     let frames = (time / FRAME).round() as u32;
     let mut pair = match Pair::new(number, Budget { cpu_s: budget, frames: u32::MAX }) {
         Ok(pair) => pair,
         Err(e) => return Played { ended: e, ..Played::default() },
     };
+    if let Err(e) = pair.s.world.set_step_work(work) {
+        return Played { ended: e.to_string(), ..Played::default() };
+    }
     let mut ended = String::new();
     for frame in 0..frames {
         if let Err(e) = pair.act().and_then(|()| pair.s.frame(FRAME)) {
@@ -320,10 +332,10 @@ fn play(number: u64, time: f64, budget: f64, trace: &mut dyn FnMut(String)) -> P
 impl Hands {
     /// Plays them; false when something was not as it must be.
     pub fn run(&self) -> bool {
-        let (time, budget) = (self.seconds, self.budget);
+        let (time, budget, work) = (self.seconds, self.budget, self.work);
         let name = |number: u64| format!("{number} ({} {})", thread(number).1, thread(number).0);
         if let Some(number) = self.only {
-            let played = play(number, time, budget, &mut |line| println!("{line}"));
+            let played = play(number, time, budget, work, &mut |line| println!("{line}"));
             print!("{}", markdown(&COLUMNS, [played.row(name(number))].into_iter()));
             return played.is_clean();
         }
@@ -334,7 +346,7 @@ impl Hands {
             self.first..self.first.saturating_add(self.seeds),
             self.jobs,
             limit,
-            move |number| play(number, time, budget, &mut |_| {}),
+            move |number| play(number, time, budget, work, &mut |_| {}),
             |number, ended| {
                 let played = match ended {
                     Ended::Well(played) => played,

@@ -56,8 +56,8 @@ pub(crate) struct Outcome {
 }
 
 /// Solves for the end of a motion from `scratch.start`, carried on to `scratch.target` by its velocity; accelerations act over `h`, which in implicit
-/// Euler is the substep. The iterate is in `state`.
-pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) -> Outcome {
+/// Euler is the substep. The iterate is in `state`. `last` says that no shorter substep will be tried.
+pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64, last: bool) -> Outcome {
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     row::couple::begin(scratch);
@@ -131,7 +131,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         unsolved = if row::couple::solved(scratch) { 0 } else { unsolved + 1 };
         let whole = out.residual / scale;
         let hopeless = unsolved > UNSOLVED || out.iterations.is_multiple_of(SOME) && whole > FAR && whole > 0.5 * way;
-        if hopeless && out.iterations < settings.newton_max {
+        if hopeless && !last {
             // Substeps half as long have a better chance than more iterations.
             break;
         }
@@ -147,6 +147,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             && length_error(model, state, scratch) <= LENGTH_TOLERANCE
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
+            && row::thread::settled(&scratch.rows.threads)
             && row::shape::settled(model, state, scratch, out.iterations)
             && !extends(model, state, scratch)
         {

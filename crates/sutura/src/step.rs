@@ -306,7 +306,7 @@ fn solve(
         row::thread::begin(model, state, scratch);
         row::shape::begin(model, state, scratch, stage.length());
         scratch.refused = None;
-        let outcome = newton::solve(model, state, scratch, stage.span);
+        let outcome = newton::solve(model, state, scratch, stage.span, depth == model.settings.halvings);
         report.newton_iterations += outcome.iterations;
         let verdict = if !outcome.finite {
             Err(Rejection::NotFinite)

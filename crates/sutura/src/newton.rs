@@ -124,14 +124,10 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             out.finite = false;
             return out;
         }
-        if scale < 1.0 {
-            // What the step was cut for must be met by a contact from now on.
-            row::thread::extend(model, state, scratch);
-        }
         unsolved = if row::couple::solved(scratch) { 0 } else { unsolved + 1 };
         let whole = out.residual / scale;
         let hopeless = unsolved > UNSOLVED || out.iterations.is_multiple_of(SOME) && whole > FAR && whole > 0.5 * way;
-        if hopeless && !last {
+        if hopeless && !last && !scratch.rows.is_empty() {
             // Substeps half as long have a better chance than more iterations.
             break;
         }

@@ -215,24 +215,94 @@ fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry
 /// Multiplications that a contact solve gets although the step has spent what it may.
 const LEAST_WORK: f64 = 1e5;
 
-/// Memory of the coupling.
+/// Contacts that depend on each other, through rods that touch, and what solves them.
 #[derive(Default)]
-pub(crate) struct Coupling {
-    entries: Vec<Entry>,
-    assembly: Assembly,
+struct Island {
+    entries: Range<usize>,
     dense: Dense,
     sparse: Sparse,
-    b: Vec<f64>,
-    mu: Vec<f64>,
-    force: Vec<f64>,
     cone: Cone,
-    right: Vec<DVec3>,
-    change: Vec<f64>,
-    steps: Vec<f64>,
     /// Whether the sparse matrix is in use, what a solution may take, and the least radius of the entries.
     many: bool,
     limits: Limits,
     smallest: f64,
+}
+
+impl Island {
+    /// Its part of a vector of components.
+    fn components(&self) -> Range<usize> {
+        3 * self.entries.start..3 * self.entries.end
+    }
+
+    /// Solves for the forces, from those given; the residual in radii.
+    fn solve(&mut self, b: &[f64], mu: &[f64], force: &mut [f64]) -> f64 {
+        let (components, entries) = (self.components(), self.entries.clone());
+        let (b, mu, force) = (&b[components.clone()], &mu[entries], &mut force[components]);
+        let left = if self.many {
+            self.cone.solve(&mut self.sparse, b, mu, force, &self.limits)
+        } else {
+            self.cone.solve(&mut self.dense, b, mu, force, &self.limits)
+        };
+        left / self.smallest
+    }
+
+    /// Replaces changes of gaps and slips by those of the forces of the contacts that press. Where there are none, none.
+    fn respond(&mut self, change: &mut [f64]) {
+        let change = &mut change[self.components()];
+        let solved = if self.many { self.cone.response(&mut self.sparse, change) } else { self.cone.response(&mut self.dense, change) };
+        if !solved {
+            change.fill(0.0);
+        }
+    }
+}
+
+/// Sorts the entries by islands, and says how many there are: rods that touch each other are of one, and all are where they share something at the border.
+fn find_islands(entries: &mut [Entry], rods: &[(Range<usize>, Range<usize>)], shared: bool, root: &mut Vec<usize>, islands: &mut Vec<Island>) -> usize {
+    let rod_of = |element: usize| rods.partition_point(|(blocks, _)| blocks.end <= element);
+    root.clear();
+    root.extend((0..rods.len()).map(|r| if shared { 0 } else { r }));
+    for entry in entries.iter().filter(|e| e.two) {
+        let [a, b] = [0, 1].map(|k| root[rod_of(entry.ends[k].element)]);
+        if a != b {
+            let (least, other) = (a.min(b), a.max(b));
+            root.iter_mut().filter(|r| **r == other).for_each(|r| *r = least);
+        }
+    }
+    let order = |e: &Entry| {
+        let (kind, row) = match e.source {
+            Source::Thread(k) => (0, k),
+            Source::Shape(k) => (1, k),
+        };
+        (root[rod_of(e.ends[0].element)], kind, row)
+    };
+    entries.sort_unstable_by_key(order);
+    let (mut count, mut from) = (0, 0);
+    for part in entries.chunk_by(|a, b| order(a).0 == order(b).0) {
+        if islands.len() == count {
+            islands.push(Island::default());
+        }
+        islands[count].entries = from..from + part.len();
+        (count, from) = (count + 1, from + part.len());
+    }
+    count
+}
+
+/// Memory of the coupling.
+#[derive(Default)]
+pub(crate) struct Coupling {
+    /// Island by island.
+    entries: Vec<Entry>,
+    islands: Vec<Island>,
+    /// How many of them are in use, and the first rod of the island of each rod.
+    count: usize,
+    root: Vec<usize>,
+    assembly: Assembly,
+    b: Vec<f64>,
+    mu: Vec<f64>,
+    force: Vec<f64>,
+    right: Vec<DVec3>,
+    change: Vec<f64>,
+    steps: Vec<f64>,
     /// Residual of the last solution, in radii.
     left: f64,
 }
@@ -272,7 +342,7 @@ pub(crate) fn zones(scratch: &mut Scratch) {
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
 pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let to_spend = scratch.allowed - scratch.spent - scratch.work;
+    let may_spend = scratch.allowed - scratch.spent;
     let Scratch { rods, rows, system, step, freedom, start, start_shape_pose, work, .. } = scratch;
     let start = Start { position: start, shape: start_shape_pose };
     let entries = &mut rows.solver.entries;
@@ -283,7 +353,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     if rows.solver.entries.is_empty() {
         return;
     }
-    let Coupling { entries, assembly, dense, sparse, b, mu, force, cone, right, left, many, limits, smallest, .. } = &mut rows.solver;
+    let Coupling { entries, islands, count, root, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
+    *count = find_islands(entries, rods, rows.border.count() > 0, root, islands);
     b.clear();
     mu.clear();
     force.clear();
@@ -292,39 +363,51 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         mu.push(entry.mu);
         force.extend(entry.force.to_array());
     }
-    let n = b.len();
-    *smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
-    *many = rows.border.count() == 0 && pays(system, rods, entries, n);
-    let most = if *many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
-    // What is left to the step is enough, or the iteration counts for nothing.
-    let most = most.min(to_spend.max(LEAST_WORK));
-    *limits = Limits { residual: params::CONTACT_TOLERANCE * *smallest, rounds: 15, steps: 60, work: most };
-    // Putting S together, and the most that its solution may take.
-    *work += if *many { most } else { 30.0 * (n * n) as f64 + most };
-    if *work > params::SUBSTEP_WORK {
-        *left = f64::INFINITY;
+    for island in &mut islands[..*count] {
+        let entries = &entries[island.entries.clone()];
+        let n = 3 * entries.len();
+        island.smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
+        island.many = rows.border.count() == 0 && pays(system, rods, entries, n);
+        let most = if island.many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
+        // What is left to the step is enough, or the iteration counts for nothing.
+        let most = most.min((may_spend - *work).max(LEAST_WORK));
+        island.limits = Limits { residual: params::CONTACT_TOLERANCE * island.smallest, rounds: 15, steps: 60, work: most };
+        // Putting S together, and the most that its solution may take.
+        *work += if island.many { most } else { 30.0 * (n * n) as f64 + most };
+        if *work > params::SUBSTEP_WORK {
+            *left = f64::INFINITY;
+            break;
+        }
+        let mut positive = true;
+        if island.many {
+            let zones = || rods.iter().map(|(_, zone)| zone).filter(|zone| entries.iter().any(|e| e.touches(zone)));
+            zones().for_each(|zone| system.invert_zone(zone));
+            island.sparse.begin(system, zones());
+            for entry in entries {
+                let ends = entry.ends().iter().map(|p| p.restricted(freedom));
+                let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
+                let places = ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]);
+                island.sparse.push(places, entry.compliance, diagonal);
+            }
+            positive = island.sparse.prepare();
+        } else {
+            island.dense.begin(n);
+            assembly.compliance(system, rods, freedom, entries, &mut island.dense.s);
+            assembly.shared(&mut rows.border, entries, &mut island.dense.s);
+            finish_dense(entries, &mut island.dense.s);
+        }
+        if positive {
+            *left = left.max(island.solve(b, mu, force));
+            *work -= island.cone.left().max(0.0);
+        } else {
+            *left = f64::INFINITY;
+        }
+    }
+    if left.is_infinite() {
         entries.clear();
+        *count = 0;
         return;
     }
-    *left = if *many {
-        for (_, zone) in rods.iter().filter(|(_, zone)| entries.iter().any(|e| e.touches(zone))) {
-            system.invert_zone(zone);
-        }
-        sparse.begin(system, rods.iter().map(|(_, zone)| zone).filter(|zone| entries.iter().any(|e| e.touches(zone))));
-        for entry in entries.iter() {
-            let ends = entry.ends().iter().map(|p| p.restricted(freedom));
-            let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
-            sparse.push(ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]), entry.compliance, diagonal);
-        }
-        if sparse.prepare() { cone.solve(sparse, b, mu, force, limits) } else { f64::INFINITY }
-    } else {
-        dense.begin(n);
-        assembly.compliance(system, rods, freedom, entries, &mut dense.s);
-        assembly.shared(&mut rows.border, entries, &mut dense.s);
-        finish_dense(entries, &mut dense.s);
-        cone.solve(dense, b, mu, force, limits)
-    } / *smallest;
-    *work -= cone.left().max(0.0);
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
     load(entries, force, &mut rows.border, right);
@@ -377,7 +460,7 @@ fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec
 /// border's steps are to be set aside.
 pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, freedom, work, .. } = scratch;
-    let Coupling { entries, dense, sparse, cone, right: more, many, change, b, .. } = &mut rows.solver;
+    let Coupling { entries, islands, count, right: more, change, b, .. } = &mut rows.solver;
     respond(rods, system, freedom, &mut rows.border, right);
     *work += 100.0 * right.len() as f64;
     if entries.is_empty() {
@@ -386,10 +469,7 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     change.clear();
     change.resize(b.len(), 0.0);
     shift(entries, &rows.border, right, change);
-    let solved = if *many { cone.response(sparse, change) } else { cone.response(dense, change) };
-    if !solved {
-        return;
-    }
+    islands[..*count].iter_mut().for_each(|island| island.respond(change));
     more.clear();
     more.resize(right.len(), DVec3::ZERO);
     load(entries, change, &mut rows.border, more);
@@ -402,16 +482,18 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
 /// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the step of both.
 pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, step, freedom, work, .. } = scratch;
-    let Coupling { entries, dense, sparse, cone, right: more, many, limits, change, steps, b, mu, force, left, smallest, .. } = &mut rows.solver;
+    let Coupling { entries, islands, count, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
     steps.clear();
     rows.border.swap_steps(steps);
     respond(rods, system, freedom, &mut rows.border, right);
     if !entries.is_empty() {
         shift(entries, &rows.border, right, b);
         change.clone_from(force);
-        *work += limits.work;
-        *left = if *many { cone.solve(sparse, b, mu, force, limits) } else { cone.solve(dense, b, mu, force, limits) } / *smallest;
-        *work -= cone.left().max(0.0);
+        *left = 0.0;
+        for island in &mut islands[..*count] {
+            *left = left.max(island.solve(b, mu, force));
+            *work += island.limits.work - island.cone.left().max(0.0);
+        }
         for (c, f) in change.iter_mut().zip(force.iter()) {
             *c = f - *c;
         }

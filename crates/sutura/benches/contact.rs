@@ -24,6 +24,9 @@ struct Job {
     frames: usize,
 }
 
+/// Makes a job of a size.
+type Make = fn(usize) -> Job;
+
 fn silk() -> Material {
     Material { bend_scale: 0.02, bend_damping: 2e-3, ..Material::elastic(8.7e9, 1300.0) }
 }
@@ -98,7 +101,7 @@ fn twist(turns: usize) -> Job {
 }
 
 fn main() {
-    let families: [(&str, fn(usize) -> Job, &[usize]); 4] = [
+    let families: [(&str, Make, &[usize]); 4] = [
         ("floor", floor, &[100, 300, 1000, 3000]),
         ("wound", wound, &[1, 3, 10, 30]),
         ("twist", twist, &[4, 12, 36, 100]),

@@ -426,7 +426,7 @@ fn respond(rods: &[(Range<usize>, Range<usize>)], system: &System, freedom: &[Fr
             *r = freedom.projector() * *r;
         }
     }
-    for (rod, zone) in rods.iter() {
+    for (rod, zone) in rods {
         system.solve(rod.clone(), zone, right);
     }
     border.couple(right, true);

@@ -142,13 +142,19 @@ pub(crate) fn advance(world: &mut World) {
         world.resource_mut::<PhysicsClock>().remaining = due - k;
         let (start, from) = (Instant::now(), simulated(world));
         world.run_schedule(PhysicsFrame);
-        passed += simulated(world) - from;
+        // A world that was put back has another time.
+        let now = (simulated(world) - from).max(0.0);
+        passed += now;
         let mut clock = world.resource_mut::<PhysicsClock>();
         clock.ms = start.elapsed().as_secs_f64() * 1e3;
         clock.now += 1;
         clock.frames += 1;
         if clock.running {
             clock.owed = (clock.owed - clock.frame).max(0.0);
+            // The rest of a frame that ended early is given up.
+            if now > 0.0 {
+                clock.lost += (clock.frame - now).max(0.0);
+            }
         }
     }
     let mut clock = world.resource_mut::<PhysicsClock>();

@@ -234,7 +234,11 @@ impl Runner {
             if let Err(e) = self.stage.bring_back(self.stage.time, dt / f64::from(pieces)) {
                 self.incident(None, e.to_string());
             }
-            incidents.extend(self.stage.world.step(dt / f64::from(pieces)).incidents);
+            let step = self.stage.world.step(dt / f64::from(pieces));
+            if step.cut {
+                self.stage.not_passed(dt / f64::from(pieces) - step.simulated);
+            }
+            incidents.extend(step.incidents);
         }
         incidents
     }
@@ -293,8 +297,6 @@ impl Runner {
             k += 1;
             let (rest, part) = (dt - done, f64::from(k) / f64::from(pieces));
             let (at, piece) = (begin + done + rest * f64::from(k) / f64::from(pieces), rest / f64::from(pieces));
-            // Of what this call has to do.
-            let before = (done - begun) / (dt - begun);
             let begin_piece = done + rest * f64::from(k - 1) / f64::from(pieces);
             if let Some(most) = self.most_work {
                 let left = most - (self.stage.world.work_done() - work_before);
@@ -308,7 +310,8 @@ impl Runner {
             } else {
                 self.allow(None);
             }
-            drive(&mut self.stage.world, if k == pieces { 1.0 } else { before + (1.0 - before) * part });
+            // A frame that was begun before has less time left: what is led goes no faster for that.
+            drive(&mut self.stage.world, if k == pieces && begun <= 0.0 { 1.0 } else { (done - begun + rest * part) / dt });
             let moved = self.stage.drive(at);
             if let Err(e) = moved.and(self.stage.bring_back(at, piece)) {
                 self.incident(None, e.to_string());
@@ -341,6 +344,7 @@ impl Runner {
             }
             if step.cut {
                 let now = begin_piece + step.simulated;
+                self.stage.not_passed(piece - step.simulated);
                 self.last_cpu = (cpu - before_call).as_secs_f64();
                 self.under_way = Some(UnderWay { report, done: now, cpu, stuck });
                 return None;
@@ -658,7 +662,7 @@ impl Runner {
         let phase = &self.scene.phases[self.phase.min(self.scene.phases.len() - 1)];
         Progress {
             frame: self.frame,
-            time: self.stage.time + self.under_way.as_ref().map_or(0.0, |u| u.done),
+            time: self.under_way.as_ref().map_or(self.stage.time, |u| self.frame as f64 / self.scene.frame_rate + u.done),
             fraction: if self.finished { 1.0 } else { (done + here) / total },
             phase: phase.name.clone(),
             ms: self.last_cpu * 1e3,

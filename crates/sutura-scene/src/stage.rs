@@ -501,6 +501,14 @@ impl Stage {
             Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
         }
     }
+    /// Of the time for which things were last brought back this did not pass, since the step ended early.
+    pub fn not_passed(&mut self, dt: f64) {
+        for l in &mut self.lent {
+            if let LentState::Back { passed, .. } = &mut l.state {
+                *passed = (*passed - dt).max(0.0);
+            }
+        }
+    }
     /// What is on its way back goes on by `dt`; the scene has it at `time`.
     pub fn bring_back(&mut self, time: f64, dt: f64) -> Result<(), Error> {
         let mut lent = std::mem::take(&mut self.lent);

@@ -142,9 +142,9 @@ impl Scratch {
     pub fn exhausted(&self) -> bool {
         self.work > crate::params::SUBSTEP_WORK
     }
-    /// Whether the step has taken all that it may.
+    /// Whether the step has taken all that it may. Where rods are held for its rest it is done to the end: which ones is not known in the next.
     pub fn late(&self) -> bool {
-        self.spent + self.work > self.allowed
+        self.held.is_empty() && self.spent + self.work > self.allowed
     }
     /// Axial stiffness of an element \[N/m\], and its axial force at its rest length \[N\].
     #[inline(always)]

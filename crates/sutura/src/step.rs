@@ -43,7 +43,8 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     state.time = interval.start;
     (scratch.work, scratch.spent, scratch.last_work, scratch.cut) = (0.0, 0.0, 0.0, false);
     // Where shorter and shorter substeps found no way within what a step may take, one is found now, whatever it takes.
-    let starved = state.last_h > 0.0 && state.last_h < model.settings.substep * STARVED;
+    let shortest = 0.75 * 0.5_f64.powi(model.settings.halvings as i32);
+    let starved = state.last_h > 0.0 && state.last_h < model.settings.substep * STARVED.max(shortest);
     scratch.allowed = model.step_work.filter(|_| !starved).unwrap_or(f64::INFINITY);
     let whole = (0..n as u32).all(|k| {
         if reel::renumber(model, state, h) {
@@ -112,7 +113,7 @@ fn advance(
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     // Rather less than what would be thrown away.
-    if report.substeps > 0 && scratch.spent + scratch.work + scratch.last_work > scratch.allowed {
+    if report.substeps > 0 && scratch.held.is_empty() && scratch.spent + scratch.work + scratch.last_work > scratch.allowed {
         scratch.cut = true;
         return false;
     }
@@ -164,7 +165,7 @@ fn advance(
             restore(state, scratch, depth);
             reel::follow(model, state);
             if scratch.late() {
-                if scratch.spent + scratch.work - before > TOO_LONG * scratch.allowed {
+                if report.substeps == 0 || scratch.spent + scratch.work - before > TOO_LONG * scratch.allowed {
                     (state.last_h, state.calm) = (0.5 * h, 0);
                 }
                 scratch.cut = true;
@@ -312,7 +313,7 @@ fn solve(
             Err(Rejection::NotFinite)
         } else if (outcome.converged || depth == model.settings.halvings) && tautest(model, scratch) >= UNBEARABLE {
             Err(Rejection::LengthNotKept)
-        } else if !outcome.converged && scratch.exhausted() {
+        } else if !outcome.converged && (scratch.exhausted() || scratch.late()) {
             Err(Rejection::TooMuchWork)
         } else if !outcome.converged && depth < model.settings.halvings {
             Err(Rejection::NotConverged)

@@ -154,6 +154,46 @@ fn a_limit_below_any_substep_makes_it_slow_and_stops_nothing() {
 }
 
 #[test]
+fn without_halvings_a_limit_still_lets_good_substeps_through_only() {
+    let mut w = Wound::new(1.25, 0.25, false);
+    let settings = Settings { halvings: 0, ..w.world.settings().clone() };
+    w.world.set_settings(settings).unwrap();
+    w.world.set_step_work(Some(1e5)).unwrap();
+    for _ in 0..40 {
+        let report = w.draw(1e-5, DT);
+        assert!(report.converged && report.incidents.is_empty(), "{report:?}");
+    }
+    assert!(w.world.time() > 0.0);
+}
+
+#[test]
+fn threads_that_took_the_place_of_others_touch_as_these_did() {
+    // A thread in a slot that was used before lies behind the others in memory. Few contacts and many.
+    for elements in [10, 300] {
+        let mut world = World::default();
+        world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY)).unwrap();
+        let lay = |world: &mut World, y: f64| {
+            let from = DVec3::new(0.0, y, 1.04 * RADIUS);
+            let to = from + DVec3::X * (1e-3 * elements as f64);
+            world.insert_rod(&RodSpec::straight(from, to, elements, RADIUS, Material::elastic(8.7e9, 1300.0))).unwrap()
+        };
+        let gone = lay(&mut world, 0.0);
+        let kept = lay(&mut world, 5e-3);
+        world.step(DT);
+        world.remove_rod(gone).unwrap();
+        let new = [lay(&mut world, 10e-3), lay(&mut world, 15e-3)];
+        for _ in 0..20 {
+            let report = world.step(DT);
+            assert!(report.incidents.is_empty(), "{:?}", report.incidents);
+            assert!(report.contacts as usize >= 3 * elements, "{} contacts", report.contacts);
+        }
+        for rod in new.into_iter().chain([kept]) {
+            assert!(world.rod(rod).unwrap().positions().iter().all(|p| (p.z / RADIUS - 1.04).abs() < 0.02));
+        }
+    }
+}
+
+#[test]
 fn a_limit_is_a_number_above_zero() {
     let mut world = World::default();
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {

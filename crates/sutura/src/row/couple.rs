@@ -68,6 +68,8 @@ impl Endpoint {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub source: Source,
+    /// Number of its island, found here.
+    pub island: u32,
     /// The second counts only with `two`: a shape's side has no rod behind it.
     pub ends: [Endpoint; 2],
     pub two: bool,
@@ -256,35 +258,40 @@ impl Island {
     }
 }
 
-/// Sorts the entries by islands, and says how many there are: rods that touch each other are of one, and all are where they share something at the border.
-fn find_islands(entries: &mut [Entry], rods: &[(Range<usize>, Range<usize>)], shared: bool, root: &mut Vec<usize>, islands: &mut Vec<Island>) -> usize {
-    let rod_of = |element: usize| rods.partition_point(|(blocks, _)| blocks.end <= element);
+/// Sorts the entries by islands and finds these: rods that touch each other are of one, and all are where they share something at the border. An island is numbered
+/// as the first of its rods, so that it finds its memory again in the next iteration.
+fn find_islands(coupling: &mut Coupling, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
+    let Coupling { entries, islands, active, root, .. } = coupling;
     root.clear();
-    root.extend((0..rods.len()).map(|r| if shared { 0 } else { r }));
-    for entry in entries.iter().filter(|e| e.two) {
-        let [a, b] = [0, 1].map(|k| root[rod_of(entry.ends[k].element)]);
+    root.extend((0..rods.len() as u32).map(|r| if shared { 0 } else { r }));
+    // In the order of slots, which need not be that of the arrays.
+    let rod_of = |p: &Endpoint| rods.iter().position(|(blocks, _)| blocks.contains(&p.element)).unwrap_or(0);
+    for entry in entries.iter_mut() {
+        let first = rod_of(&entry.ends[0]);
+        entry.island = first as u32;
+        if !entry.two {
+            continue;
+        }
+        let (a, b) = (root[first], root[rod_of(&entry.ends[1])]);
         if a != b {
-            let (least, other) = (a.min(b), a.max(b));
-            root.iter_mut().filter(|r| **r == other).for_each(|r| *r = least);
+            root.iter_mut().filter(|r| **r == a.max(b)).for_each(|r| *r = a.min(b));
         }
     }
-    let order = |e: &Entry| {
-        let (kind, row) = match e.source {
-            Source::Thread(k) => (0, k),
-            Source::Shape(k) => (1, k),
-        };
-        (root[rod_of(e.ends[0].element)], kind, row)
-    };
-    entries.sort_unstable_by_key(order);
-    let (mut count, mut from) = (0, 0);
-    for part in entries.chunk_by(|a, b| order(a).0 == order(b).0) {
-        if islands.len() == count {
-            islands.push(Island::default());
-        }
-        islands[count].entries = from..from + part.len();
-        (count, from) = (count + 1, from + part.len());
+    entries.iter_mut().for_each(|e| e.island = root[e.island as usize]);
+    entries.sort_unstable_by_key(|e| match e.source {
+        Source::Thread(k) => (e.island, 0, k),
+        Source::Shape(k) => (e.island, 1, k),
+    });
+    if islands.len() < rods.len() {
+        islands.resize_with(rods.len(), Island::default);
     }
-    count
+    active.clear();
+    let mut from = 0;
+    for part in entries.chunk_by(|a, b| a.island == b.island) {
+        islands[part[0].island as usize].entries = from..from + part.len();
+        active.push(part[0].island);
+        from += part.len();
+    }
 }
 
 /// Memory of the coupling.
@@ -293,9 +300,9 @@ pub(crate) struct Coupling {
     /// Island by island.
     entries: Vec<Entry>,
     islands: Vec<Island>,
-    /// How many of them are in use, and the first rod of the island of each rod.
-    count: usize,
-    root: Vec<usize>,
+    /// Those in use, and that of each rod.
+    active: Vec<u32>,
+    root: Vec<u32>,
     assembly: Assembly,
     b: Vec<f64>,
     mu: Vec<f64>,
@@ -353,8 +360,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
     if rows.solver.entries.is_empty() {
         return;
     }
-    let Coupling { entries, islands, count, root, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
-    *count = find_islands(entries, rods, rows.border.count() > 0, root, islands);
+    find_islands(&mut rows.solver, rods, rows.border.count() > 0);
+    let Coupling { entries, islands, active, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -363,7 +370,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         mu.push(entry.mu);
         force.extend(entry.force.to_array());
     }
-    for island in &mut islands[..*count] {
+    for k in active.iter() {
+        let island = &mut islands[*k as usize];
         let entries = &entries[island.entries.clone()];
         let n = 3 * entries.len();
         island.smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
@@ -401,11 +409,12 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
             *work -= island.cone.left().max(0.0);
         } else {
             *left = f64::INFINITY;
+            *work -= most;
         }
     }
     if left.is_infinite() {
         entries.clear();
-        *count = 0;
+        active.clear();
         return;
     }
     right.clear();
@@ -460,7 +469,7 @@ fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec
 /// border's steps are to be set aside.
 pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, freedom, work, .. } = scratch;
-    let Coupling { entries, islands, count, right: more, change, b, .. } = &mut rows.solver;
+    let Coupling { entries, islands, active, right: more, change, b, .. } = &mut rows.solver;
     respond(rods, system, freedom, &mut rows.border, right);
     *work += 100.0 * right.len() as f64;
     if entries.is_empty() {
@@ -469,7 +478,7 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     change.clear();
     change.resize(b.len(), 0.0);
     shift(entries, &rows.border, right, change);
-    islands[..*count].iter_mut().for_each(|island| island.respond(change));
+    active.iter().for_each(|k| islands[*k as usize].respond(change));
     more.clear();
     more.resize(right.len(), DVec3::ZERO);
     load(entries, change, &mut rows.border, more);
@@ -482,7 +491,7 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
 /// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the step of both.
 pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, step, freedom, work, .. } = scratch;
-    let Coupling { entries, islands, count, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
+    let Coupling { entries, islands, active, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
     steps.clear();
     rows.border.swap_steps(steps);
     respond(rods, system, freedom, &mut rows.border, right);
@@ -490,7 +499,8 @@ pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
         shift(entries, &rows.border, right, b);
         change.clone_from(force);
         *left = 0.0;
-        for island in &mut islands[..*count] {
+        for k in active.iter() {
+            let island = &mut islands[*k as usize];
             *left = left.max(island.solve(b, mu, force));
             *work += island.limits.work - island.cone.left().max(0.0);
         }

@@ -632,6 +632,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let end = Endpoint::new(e, row.s, axes);
         entries.push(Entry {
             source: Source::Shape(k as u32),
+            island: 0,
             ends: [end, end],
             two: false,
             slider: slider.map(|j| {

@@ -121,6 +121,8 @@ impl Sparse {
                 }
             }
         }
+        // Zones come in the order of slots.
+        self.zones.sort_unstable();
     }
 
     /// The node of a block of the zones.

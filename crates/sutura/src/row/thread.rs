@@ -313,6 +313,7 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
         let [a, b] = row.endpoints();
         entries.push(Entry {
             source: Source::Thread(k as u32),
+            island: 0,
             ends: [a, b],
             two: true,
             slider: None,

@@ -143,7 +143,6 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             && length_error(model, state, scratch) <= LENGTH_TOLERANCE
             && row::couple::solved(scratch)
             && brake::settled(model, state, &scratch.brakes)
-            && row::thread::settled(&scratch.rows.threads)
             && row::shape::settled(model, state, scratch, out.iterations)
             && !extends(model, state, scratch)
         {

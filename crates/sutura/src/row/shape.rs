@@ -676,7 +676,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 // Where one after another goes over its limit the last digit would take an iteration each.
                 let front = iterations > params::FRONT && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
-            } else if row.normal_force > 0.0 {
+            } else if row.normal_force > 0.0 && row.carried <= 0.0 {
                 settled &= row.normal_force * (row.entered - row.compliance()) <= params::SLACK * row.radius;
             } else {
                 look(model, state, &start, &mut now);

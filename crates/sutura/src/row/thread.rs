@@ -326,12 +326,6 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
     }
 }
 
-/// Whether no row is deeper than its force presses it: in an iteration it is as stiff as its last force makes it.
-pub(crate) fn settled(rows: &[ThreadRow]) -> bool {
-    let far = |row: &ThreadRow| row.force.x * (row.entered - row.compliance()) > params::SLACK * row.radii[0].min(row.radii[1]);
-    !rows.iter().any(far)
-}
-
 /// Factor on the update so that no pair of centerlines comes nearer than half of the least distance allowed on the straight way from the start of the substep to
 /// where the update leads; a pair that would goes most of the way there. (Only that way counts, as where a substep is accepted: a prediction may have brought two
 /// pieces into or past each other, and the way back is free.)

@@ -73,6 +73,9 @@ fn sensitivity(scene: &Scene, frames: u32) -> f64 {
     (0..3).map(moved).fold(1e-8, f64::max)
 }
 
+/// Over its length, how far a thread may be from one that began elsewhere by 1e-10, where it is said where it is.
+const TOGETHER: f64 = 0.03;
+
 const TURNED: Way = Way { turn: DQuat::from_xyzw(0.1, -0.5, 0.7, 0.5), mirror: false, reversed: false, scale: 1.0 };
 
 fn turned() -> Way {
@@ -132,8 +135,9 @@ proptest! {
     fn turned_and_rescaled_to_rounding(numbers in numbers()) {
         let mut scene = sensible(numbers, Kind::Free);
         (scene.settings.tolerance, scene.settings.newton_max) = (1e-7, 40);
-        let frames = scene.frames.min(8);
-        let allowed = 3.0 * sensitivity(&scene, frames);
+        // As far as two threads that begin alike stay together: a rough one that lashes about itself is anywhere after a frame or two.
+        let known = [scene.frames.min(8), 1].into_iter().map(|f| (f, 3.0 * sensitivity(&scene, f))).find(|(_, allowed)| *allowed < TOGETHER);
+        let Some((frames, allowed)) = known else { return Ok(()) };
         for (name, way) in [("turned", turned()), ("x 10", Way { scale: 10.0, ..Way::default() }), ("x 0.1", Way { scale: 0.1, ..Way::default() })] {
             let off = off(&scene, &way, frames);
             prop_assert!(off <= allowed, "{}: {:e} for {:e}", name, off, allowed);

@@ -152,8 +152,8 @@ pub(crate) fn advance(world: &mut World) {
         if clock.running {
             clock.owed = (clock.owed - clock.frame).max(0.0);
             // The rest of a frame that ended early is given up.
-            if now > 0.0 {
-                clock.lost += (clock.frame - now).max(0.0);
+            if (1e-6..1.0 - 1e-6).contains(&(now / clock.frame)) {
+                clock.lost += clock.frame - now;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Frames of physics in real time.
 
-use bevy::ecs::schedule::ScheduleLabel;
 use crate::world::Sutura;
+use bevy::ecs::schedule::ScheduleLabel;
 use bevy::prelude::*;
 use std::time::{Duration, Instant};
 

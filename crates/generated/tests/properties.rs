@@ -135,9 +135,12 @@ proptest! {
     fn turned_and_rescaled_to_rounding(numbers in numbers()) {
         let mut scene = sensible(numbers, Kind::Free);
         (scene.settings.tolerance, scene.settings.newton_max) = (1e-7, 40);
-        // As far as two threads that begin alike stay together: a rough one that lashes about itself is anywhere after a frame or two.
-        let known = [scene.frames.min(8), 1].into_iter().map(|f| (f, 3.0 * sensitivity(&scene, f))).find(|(_, allowed)| *allowed < TOGETHER);
-        let Some((frames, allowed)) = known else { return Ok(()) };
+        let frames = scene.frames.min(8);
+        let allowed = 3.0 * sensitivity(&scene, frames);
+        if allowed > TOGETHER {
+            // A rough one that lashes about itself is anywhere after a frame or two: what is compared then is chance.
+            return Ok(());
+        }
         for (name, way) in [("turned", turned()), ("x 10", Way { scale: 10.0, ..Way::default() }), ("x 0.1", Way { scale: 0.1, ..Way::default() })] {
             let off = off(&scene, &way, frames);
             prop_assert!(off <= allowed, "{}: {:e} for {:e}", name, off, allowed);

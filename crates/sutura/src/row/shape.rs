@@ -653,8 +653,7 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
     if from == to { DVec3::ZERO } else { point - from.transform_point(to.inverse_transform_point(point)) }
 }
 
-/// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization. (A light row is as stiff in an iteration
-/// as its last force makes it. One that was just met is as soft as the least force, and may lie deep in the shape in the first iteration that knows of it.)
+/// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization.
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, iterations: u32) -> bool {
     let Scratch { rows, start, start_shape_pose, step, .. } = scratch;
     let start = Start { position: start, shape: start_shape_pose };
@@ -676,9 +675,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 // Where one after another goes over its limit the last digit would take an iteration each.
                 let front = iterations > params::FRONT && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
-            } else if row.normal_force > 0.0 && row.carried <= 0.0 {
-                settled &= row.normal_force * (row.entered - row.compliance()) <= params::SLACK * row.radius;
-            } else {
+            } else if row.normal_force <= 0.0 {
                 look(model, state, &start, &mut now);
                 if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
                     (row.wanted, settled) = (true, false);

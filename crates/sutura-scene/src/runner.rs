@@ -88,7 +88,7 @@ pub struct Progress {
     pub phase: String,
     /// Solver time of this call \[ms\].
     pub ms: f64,
-    /// Whether the frame is not finished, since the call had spent its work ([`Runner::limit_work`]): the next call goes on with it.
+    /// True where the frame is not finished, since the call had spent its work ([`Runner::limit_work`]): the next call goes on with it.
     pub cut: bool,
     /// Whether the run is over; further calls do nothing.
     pub finished: bool,

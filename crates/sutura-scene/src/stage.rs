@@ -501,7 +501,7 @@ impl Stage {
             Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
         }
     }
-    /// Of the time for which things were last brought back this did not pass, since the step ended early.
+    /// Takes back a part of the time for which things were last brought back: the step ended early, and that part did not pass.
     pub fn not_passed(&mut self, dt: f64) {
         for l in &mut self.lent {
             if let LentState::Back { passed, .. } = &mut l.state {

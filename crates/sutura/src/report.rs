@@ -10,10 +10,10 @@ use crate::model::rod::Rod;
 pub struct StepReport {
     /// Simulated time at the end \[s\].
     pub time: f64,
-    /// Of the time wanted, what was simulated \[s\]. The rest passed with everything at rest, as where no acceptable substep was found; where the step was `cut` it
+    /// Time that was simulated, of the time wanted \[s\]. The rest passed with everything at rest, as where no acceptable substep was found; where the step was `cut` it
     /// did not pass.
     pub simulated: f64,
-    /// Whether it ended early, since it had spent its work ([`World::set_step_work`](crate::World::set_step_work)).
+    /// True where the step ended early, since it had spent its work ([`World::set_step_work`](crate::World::set_step_work)).
     pub cut: bool,
     /// Work that it took, in rough counts of multiply-adds.
     pub work: f64,

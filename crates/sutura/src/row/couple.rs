@@ -224,7 +224,7 @@ struct Island {
     dense: Dense,
     sparse: Sparse,
     cone: Cone,
-    /// Whether the sparse matrix is in use, what a solution may take, and the least radius of the entries.
+    /// The sparse matrix is in use; what a solution may take; the least radius of the entries.
     many: bool,
     limits: Limits,
     smallest: f64,

@@ -30,7 +30,7 @@ const PASSES: usize = 2;
 pub(crate) struct Follow {
     /// Firm rows that slide.
     rows: Vec<u32>,
-    /// What their friction is too small by, or an image of it.
+    /// Friction that is missing at each row \[N\].
     missing: Vec<f64>,
     basis: Vec<f64>,
     change: Vec<f64>,

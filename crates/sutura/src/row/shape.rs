@@ -150,12 +150,12 @@ impl ShapeRow {
         self.mode = Some(self.friction).filter(|_| self.sliding).and_then(DVec3::try_normalize).map_or(Mode::Sticks, Mode::Slides);
     }
 
-    /// Whether it is a firm row that slides.
+    /// Says whether this is a firm row that slides.
     pub fn slides(&self) -> bool {
         self.firm && self.rim != DVec3::ZERO
     }
 
-    /// What its friction is too small by where the step leads, and whether it presses there.
+    /// Returns what its friction is too small by where the step leads, and whether it presses there.
     pub fn missing(&self, step: &[DVec3], sliders: &Sliders, border: &Border) -> (f64, bool) {
         let pressed = self.normal_force - self.stiffness * self.normal.dot(moved(self, step, sliders, border));
         (self.mu() * (pressed.max(0.0) - self.pressed) - self.followed, pressed > 0.0)

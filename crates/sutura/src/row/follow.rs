@@ -1,6 +1,6 @@
 //! Friction of sliding firm rows follows their normal forces. In the rods' matrix the friction force of such a row has a fixed size, mu times the normal force that
 //! presses now: a matrix in which it followed would not be symmetric. Letting it follow from one Newton iteration to the next is a fixed-point iteration whose
-//! error grows with the friction around a post, at first by (mu phi) an iteration: wound once, or knotted around something, it does not converge.
+//! error shrinks as (mu phi)^k / k! along one strand around a post, so it grows at first; where both strands of a knot slide it was seen to grow to the end.
 //!
 //! So each Newton step is corrected: the changes `v` of the sizes solve
 //!

@@ -18,8 +18,8 @@ pub enum PhysicsSet {
     Step,
 }
 
-/// All frames of physics of a drawn frame, and what is drawn of them, in `RunFixedMainLoop`. What runs after it in that schedule sees the new state before
-/// `Update`.
+/// All frames of physics of a drawn frame, and what is drawn of them, in `RunFixedMainLoop`. What runs after it in that
+/// schedule sees the new state before `Update`.
 #[derive(SystemSet, Debug, Clone, PartialEq, Eq, Hash)]
 pub struct PhysicsLoop;
 
@@ -36,13 +36,15 @@ pub struct PhysicsClock {
     pub by_hand: u32,
     /// Most time of a drawn frame that physics may take. At least one frame is done where one is due.
     pub budget: Duration,
-    /// Where all the rest of a drawn frame takes longer than `budget`, physics may take as long, but not longer than this: so slow pictures slow no physics.
+    /// Where all the rest of a drawn frame takes longer than `budget`, physics may take as long, but not longer than
+    /// this: so slow pictures slow no physics.
     pub share: Duration,
-    /// Most time that a frame of physics may take, where it may not take as long as it needs. One that needs longer ends early, at a state as good as any: slow
-    /// motion, but no picture that waits. What it does then depends on how fast the machine is; a recording of the input plays it back as it was.
+    /// Most time that a frame of physics may take, where it may not take as long as it needs. One that needs longer
+    /// ends early, at a state as good as any: slow motion, but no picture that waits. What it does then depends on how
+    /// fast the machine is; a recording of the input plays it back as it was.
     pub most_frame: Option<Duration>,
-    /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs slowly instead of
-    /// running after a debt that only grows.
+    /// Most simulated time that may be owed \[s\]. What exceeds it is given up, so that physics which is too slow runs
+    /// slowly instead of running after a debt that only grows.
     pub most_owed: f64,
     /// Simulated time that is owed \[s\].
     pub owed: f64,
@@ -92,7 +94,8 @@ impl Default for PhysicsClock {
 }
 
 impl PhysicsClock {
-    /// Part of a frame by which real time is ahead of the world, in [0, 1]: pictures are drawn between the last two states.
+    /// Part of a frame by which real time is ahead of the world, in [0, 1]: pictures are drawn between the last two
+    /// states.
     pub fn ahead(&self) -> f64 {
         if self.running { (self.owed / self.frame).clamp(0.0, 1.0) } else { 1.0 }
     }
@@ -100,8 +103,8 @@ impl PhysicsClock {
     pub fn is_late(&self) -> bool {
         self.running && self.owed > 0.5 * self.most_owed
     }
-    /// Forgets what is owed, as where another world begins. It is drawn as it begins: time before it counts for nothing, nor does the time of the drawn frame
-    /// that made it, which may be long.
+    /// Forgets what is owed, as where another world begins. It is drawn as it begins: time before it counts for
+    /// nothing, nor does the time of the drawn frame that made it, which may be long.
     pub fn restart(&mut self) {
         (self.owed, self.lost, self.rate, self.watched, self.frames, self.free) = (0.0, 0.0, 0.0, 0.0, 0, 2);
     }

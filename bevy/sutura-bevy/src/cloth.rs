@@ -9,7 +9,8 @@ use sutura::glam::{DVec2, DVec3};
 /// A cloth in the plane z = 0 of its own axes, its folds below.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cloth {
-    /// Half the side of the part that is looked at \[m\]: there its mesh is fine, and beyond it gets darker, as beside the lamp of a table.
+    /// Half the side of the part that is looked at \[m\]: there its mesh is fine, and beyond it gets darker, as beside
+    /// the lamp of a table.
     pub reach: f64,
     /// Half the side of all of it \[m\].
     pub half: f64,
@@ -38,7 +39,8 @@ impl Default for Cloth {
 }
 
 impl Cloth {
-    /// As a mesh for the material [`drape`](crate::look::Materials::drape), a meter in so many units, in the axes of the engine.
+    /// As a mesh for the material [`drape`](crate::look::Materials::drape), a meter in so many units, in the axes of
+    /// the engine.
     pub fn mesh(&self, scale: f32) -> Mesh {
         let (surface, light) = self.surface();
         let colors: Vec<[f32; 4]> = light.iter().map(|l| [*l, *l, *l, 1.0]).collect();
@@ -47,7 +49,8 @@ impl Cloth {
 
     /// Its surface, and how much light comes to each corner: less in the valleys, and less far from the middle.
     pub fn surface(&self) -> (Triangles, Vec<f32>) {
-        // Cells a side: ironed cloth needs them for the light alone. Small triangles cost more than anything else where the renderer is software.
+        // Cells a side: ironed cloth needs them for the light alone. Small triangles cost more than anything else where
+        // the renderer is software.
         let n: usize = if self.folds > 0.0 { 72 } else { 32 };
         let at = |k: usize| self.along_side(2.0 * k as f64 / n as f64 - 1.0);
         let folds = folds();
@@ -57,7 +60,8 @@ impl Cloth {
             let near = self.folds / (1.0 + (p.length() / (1.8 * self.reach)).powi(4));
             if self.folds > 0.0 { near * folds.iter().map(|f| f.height(p)).sum::<f64>() } else { 0.0 }
         };
-        let mut heights: Vec<f64> = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| height(at(i), at(j))).collect();
+        let mut heights: Vec<f64> =
+            (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| height(at(i), at(j))).collect();
         let crest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         heights.iter_mut().for_each(|h| *h -= crest);
         let h = |i: usize, j: usize| heights[j * (n + 1) + i];
@@ -67,7 +71,8 @@ impl Cloth {
                 let (x, y) = (at(i), at(j));
                 // Normals are finer than the corners are apart.
                 let e = 5e-4;
-                let slope = DVec2::new(height(x + e, y) - height(x - e, y), height(x, y + e) - height(x, y - e)) / (2.0 * e);
+                let slope =
+                    DVec2::new(height(x + e, y) - height(x - e, y), height(x, y + e) - height(x, y - e)) / (2.0 * e);
                 out.positions.push(DVec3::new(x, y, h(i, j)));
                 out.normals.push(DVec3::new(-slope.x, -slope.y, 1.0).normalize());
                 out.uvs.push([x, y]);
@@ -87,7 +92,11 @@ impl Cloth {
     fn along_side(&self, t: f64) -> f64 {
         let (inner, part) = (1.35 * self.reach, 0.74);
         let s = t.abs();
-        let x = if s <= part { inner * s / part } else { inner * (self.half / inner).max(1.0).powf(((s - part) / (1.0 - part)).powf(1.3)) };
+        let x = if s <= part {
+            inner * s / part
+        } else {
+            inner * (self.half / inner).max(1.0).powf(((s - part) / (1.0 - part)).powf(1.3))
+        };
         x.copysign(t)
     }
 }
@@ -143,7 +152,9 @@ pub(crate) fn uneven(k: f32, period: f32, seed: u32) -> f32 {
 
 /// A smooth wave of period 1 with no two crests alike, in [-1, 1].
 pub(crate) fn wave(x: f32, seed: u32) -> f32 {
-    let part = |n: u32| (core::f32::consts::TAU * ((n as f32) * x + noise(seed.wrapping_mul(17).wrapping_add(n)) as f32)).sin();
+    let part = |n: u32| {
+        (core::f32::consts::TAU * ((n as f32) * x + noise(seed.wrapping_mul(17).wrapping_add(n)) as f32)).sin()
+    };
     (part(2) + 0.7 * part(3) + 0.6 * part(5) + 0.4 * part(9)) / 2.7
 }
 

@@ -22,7 +22,8 @@ use sutura::{Geometry, Pose};
 /// Bones of one mesh: Bevy's limit, which is that of a uniform buffer.
 const MOST_BONES: usize = 256;
 
-/// A thread as it is drawn. [`Thread`]s have theirs from the world; one without a `Thread` (of a recording) is drawn as it is set.
+/// A thread as it is drawn. [`Thread`]s have theirs from the world; one without a `Thread` (of a recording) is drawn as
+/// it is set.
 #[derive(Component, Debug, Clone, PartialEq)]
 #[require(Transform, Visibility)]
 pub struct Strand {
@@ -86,7 +87,8 @@ pub(crate) struct States {
     now: Vec<(DVec3, DQuat)>,
 }
 
-/// Whether what is drawn follows the world. While it does not, [`Strand`]s and [`Solid`]s are whoever's who turned it off: to show the past.
+/// Whether what is drawn follows the world. While it does not, [`Strand`]s and [`Solid`]s are whoever's who turned it
+/// off: to show the past.
 #[derive(Resource, Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Live(pub bool);
 
@@ -94,7 +96,10 @@ pub struct Live(pub bool);
 pub(crate) fn build(app: &mut App) {
     // They follow the world whether or not there is a renderer.
     app.insert_resource(Live(true));
-    app.add_systems(RunFixedMainLoop, (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0));
+    app.add_systems(
+        RunFixedMainLoop,
+        (show_threads, show_bodies).chain().after(advance).in_set(PhysicsLoop).run_if(|live: Res<Live>| live.0),
+    );
     let renders = resource_exists::<Assets<StandardMaterial>>;
     app.add_systems(Startup, make_materials.run_if(renders));
     // Meshes that change are told to the renderer of the same picture.
@@ -108,7 +113,11 @@ pub(crate) fn build(app: &mut App) {
     );
 }
 
-fn make_materials(mut commands: Commands, mut images: ResMut<Assets<Image>>, mut materials: ResMut<Assets<StandardMaterial>>) {
+fn make_materials(
+    mut commands: Commands,
+    mut images: ResMut<Assets<Image>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
     commands.insert_resource(Materials::make(&mut images, &mut materials));
 }
 
@@ -123,8 +132,15 @@ pub(crate) fn show_threads(
         let Some(rod) = thread.handle().and_then(|h| sutura.world().rod(h).ok()) else { continue };
         let (Some(mut strand), Some(mut states)) = (strand, states) else {
             let (positions, orientations) = (rod.positions().to_vec(), rod.orientations().to_vec());
-            let strand =
-                Strand { skin: SkinSpec::of(&rod), positions, orientations, tensions: Vec::new(), look: thread.look, stoutness: 1.0, tension_scale: None };
+            let strand = Strand {
+                skin: SkinSpec::of(&rod),
+                positions,
+                orientations,
+                tensions: Vec::new(),
+                look: thread.look,
+                stoutness: 1.0,
+                tension_scale: None,
+            };
             commands.entity(entity).insert((strand, States { frames: u64::MAX, ..States::default() }));
             continue;
         };
@@ -162,7 +178,11 @@ pub(crate) fn show_threads(
 }
 
 /// Solids of the bodies of the world.
-pub(crate) fn show_bodies(mut commands: Commands, sutura: Res<Sutura>, mut bodies: Query<(Entity, &Body, Option<&mut Solid>)>) {
+pub(crate) fn show_bodies(
+    mut commands: Commands,
+    sutura: Res<Sutura>,
+    mut bodies: Query<(Entity, &Body, Option<&mut Solid>)>,
+) {
     for (entity, body, solid) in &mut bodies {
         let Some(shape) = body.handle().and_then(|h| sutura.world().shape(h).ok()) else { continue };
         match solid {
@@ -172,7 +192,11 @@ pub(crate) fn show_bodies(mut commands: Commands, sutura: Res<Sutura>, mut bodie
                 }
             }
             None => {
-                commands.entity(entity).insert(Solid { geometry: shape.geometry.clone(), pose: shape.pose, look: body.look });
+                commands.entity(entity).insert(Solid {
+                    geometry: shape.geometry.clone(),
+                    pose: shape.pose,
+                    look: body.look,
+                });
             }
         }
     }
@@ -205,26 +229,49 @@ fn mesh_strands(
             }
         };
         // A bone has no Transform: its place in the world is set as it is, and nothing is propagated.
-        let bones: Vec<Entity> = (0..skin.n_bones()).map(|_| commands.spawn((GlobalTransform::default(), ChildOf(entity))).id()).collect();
+        let bones: Vec<Entity> =
+            (0..skin.n_bones()).map(|_| commands.spawn((GlobalTransform::default(), ChildOf(entity))).id()).collect();
         let material = look::thread(&strand.look, &mut images);
         let colored = materials.add(StandardMaterial { base_color_texture: None, ..material.clone() });
         let plain = materials.add(material);
         let (mut parts, mut most) = (Vec::new(), Vec::new());
         for part in tube::parts(&skin, MOST_BONES) {
-            let bind = part.bones.iter().map(|b| Mat4::from_translation(Vec3::NEG_Z * skin.bind()[usize::from(*b)] as f32 * space.scale));
-            let skinned =
-                SkinnedMesh { inverse_bindposes: poses.add(bind.collect::<Vec<_>>()), joints: part.bones.iter().map(|b| bones[usize::from(*b)]).collect() };
+            let bind = part
+                .bones
+                .iter()
+                .map(|b| Mat4::from_translation(Vec3::NEG_Z * skin.bind()[usize::from(*b)] as f32 * space.scale));
+            let skinned = SkinnedMesh {
+                inverse_bindposes: poses.add(bind.collect::<Vec<_>>()),
+                joints: part.bones.iter().map(|b| bones[usize::from(*b)]).collect(),
+            };
             let strongest = |v: &u32| {
                 let (joints, weights) = (skin.joints()[*v as usize], skin.weights()[*v as usize]);
                 (0..4).max_by(|a, b| weights[*a].total_cmp(&weights[*b])).map_or(0, |k| joints[k])
             };
             most.push(part.vertices.iter().map(strongest).collect());
             // Its bounds at rest say nothing of where it is.
-            let shown = (Mesh3d(meshes.add(skin_mesh(&skin, &part, space.scale))), MeshMaterial3d(plain.clone()), skinned, NoFrustumCulling, ChildOf(entity));
+            let shown = (
+                Mesh3d(meshes.add(skin_mesh(&skin, &part, space.scale))),
+                MeshMaterial3d(plain.clone()),
+                skinned,
+                NoFrustumCulling,
+                ChildOf(entity),
+            );
             parts.push(commands.spawn(shown).id());
         }
         let (spec, look, stoutness) = (strand.skin.clone(), strand.look, strand.stoutness);
-        commands.entity(entity).insert(Drawn { bones, parts, most, skin, spec, look, stoutness, plain, colored, is_colored: false });
+        commands.entity(entity).insert(Drawn {
+            bones,
+            parts,
+            most,
+            skin,
+            spec,
+            look,
+            stoutness,
+            plain,
+            colored,
+            is_colored: false,
+        });
     }
 }
 
@@ -239,17 +286,30 @@ fn skin_mesh(skin: &Skin, part: &tube::Part, scale: f32) -> Mesh {
         [t.x, t.y, t.z, 1.0]
     };
     Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, part.vertices.iter().map(|v| mesh.positions[of(v)].map(|x| x * scale)).collect::<Vec<_>>())
+        .with_inserted_attribute(
+            Mesh::ATTRIBUTE_POSITION,
+            part.vertices.iter().map(|v| mesh.positions[of(v)].map(|x| x * scale)).collect::<Vec<_>>(),
+        )
         .with_inserted_attribute(Mesh::ATTRIBUTE_TANGENT, normals.iter().map(tangent).collect::<Vec<[f32; 4]>>())
         .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, part.vertices.iter().map(|v| mesh.uvs[of(v)]).collect::<Vec<_>>())
+        .with_inserted_attribute(
+            Mesh::ATTRIBUTE_UV_0,
+            part.vertices.iter().map(|v| mesh.uvs[of(v)]).collect::<Vec<_>>(),
+        )
         .with_inserted_attribute(Mesh::ATTRIBUTE_JOINT_INDEX, VertexAttributeValues::Uint16x4(part.joints.clone()))
-        .with_inserted_attribute(Mesh::ATTRIBUTE_JOINT_WEIGHT, part.vertices.iter().map(|v| skin.weights()[of(v)]).collect::<Vec<_>>())
+        .with_inserted_attribute(
+            Mesh::ATTRIBUTE_JOINT_WEIGHT,
+            part.vertices.iter().map(|v| skin.weights()[of(v)]).collect::<Vec<_>>(),
+        )
         .with_inserted_indices(Indices::U32(part.indices.clone()))
 }
 
 /// Puts the bones where the elements are.
-fn pose_bones(space: Res<Space>, strands: Query<(&Strand, &Drawn), Or<(Changed<Strand>, Changed<Drawn>)>>, mut bones: Query<&mut GlobalTransform>) {
+fn pose_bones(
+    space: Res<Space>,
+    strands: Query<(&Strand, &Drawn), Or<(Changed<Strand>, Changed<Drawn>)>>,
+    mut bones: Query<&mut GlobalTransform>,
+) {
     let mut posed = Vec::new();
     for (strand, drawn) in &strands {
         if drawn.spec != strand.skin {
@@ -327,7 +387,11 @@ fn mesh_solids(
             BodyLook::Hidden => continue,
         };
         // What threads lie on is as flat as it is to them.
-        let mesh = if plane { Cloth::default().mesh(space.scale) } else { mesh(&Triangles::of(&solid.geometry, 0.0), space.scale, DRAPE_TILE) };
+        let mesh = if plane {
+            Cloth::default().mesh(space.scale)
+        } else {
+            mesh(&Triangles::of(&solid.geometry, 0.0), space.scale, DRAPE_TILE)
+        };
         commands.entity(entity).insert((Mesh3d(meshes.add(mesh)), MeshMaterial3d(material.clone())));
     }
 }
@@ -336,9 +400,15 @@ fn mesh_solids(
 pub(crate) fn mesh(t: &Triangles, scale: f32, tile: f32) -> Mesh {
     let v = |p: &DVec3| [p.x as f32, p.y as f32, p.z as f32];
     let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::default())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, t.positions.iter().map(|p| v(p).map(|x| x * scale)).collect::<Vec<_>>())
+        .with_inserted_attribute(
+            Mesh::ATTRIBUTE_POSITION,
+            t.positions.iter().map(|p| v(p).map(|x| x * scale)).collect::<Vec<_>>(),
+        )
         .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, t.normals.iter().map(v).collect::<Vec<_>>())
-        .with_inserted_attribute(Mesh::ATTRIBUTE_UV_0, t.uvs.iter().map(|uv| uv.map(|x| x as f32 / tile)).collect::<Vec<_>>())
+        .with_inserted_attribute(
+            Mesh::ATTRIBUTE_UV_0,
+            t.uvs.iter().map(|uv| uv.map(|x| x as f32 / tile)).collect::<Vec<_>>(),
+        )
         .with_inserted_indices(Indices::U32(t.indices.iter().flatten().copied().collect()));
     // Tangents along u: across the normal, about the z axis where it can be.
     let tangent = |n: &DVec3| {

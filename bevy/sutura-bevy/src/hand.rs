@@ -13,8 +13,8 @@ use sutura::{Geometry, Handle, Hold, Place, Pose, Rod};
 #[derive(Component, Debug, Clone, Copy, Default)]
 pub struct PointerCamera;
 
-/// The input of the hand. Where there is a primary window and a [`PointerCamera`], it is read from the mouse each frame; else (in a test, on another
-/// device) whoever has such a thing writes it.
+/// The input of the hand. Where there is a primary window and a [`PointerCamera`], it is read from the mouse each
+/// frame; else (in a test, on another device) whoever has such a thing writes it.
 #[derive(Resource, Debug, Clone, Default)]
 pub struct Pointer {
     /// Line of sight through the pointer in Bevy's world.
@@ -47,7 +47,8 @@ pub struct Hand {
     pub hold: Hold,
     /// What it holds.
     pub held: Option<Held>,
-    /// Where it was taken, now \[m\], and the force with which it acts on what it holds \[N\], world axes of the engine.
+    /// Where it was taken, now \[m\], and the force with which it acts on what it holds \[N\], world axes of the
+    /// engine.
     pub at: DVec3,
     /// See `at`.
     pub force: DVec3,
@@ -92,7 +93,9 @@ pub(crate) fn read_pointer(
     cameras: Query<(&Camera, &GlobalTransform), With<PointerCamera>>,
     buttons: Option<Res<ButtonInput<MouseButton>>>,
 ) {
-    let (Ok(window), Ok((camera, place)), Some(buttons)) = (windows.single(), cameras.single(), buttons) else { return };
+    let (Ok(window), Ok((camera, place)), Some(buttons)) = (windows.single(), cameras.single(), buttons) else {
+        return;
+    };
     // Eight pixels of the window's height.
     pointer.reach = 8.0 * 0.8 / window.height().max(1.0);
     pointer.forward = place.forward().into();
@@ -137,7 +140,8 @@ pub(crate) fn grab(
         let t = match (thread, body) {
             // A thread behind a body is hidden.
             (Some(thread), body) if body.is_none_or(|b| thread.t <= b.1 + thread.radius) => {
-                let theirs = thread.handle.and_then(|rod| Some((sutura.grip_at(rod, thread.particle)?, sutura.world())));
+                let theirs =
+                    thread.handle.and_then(|rod| Some((sutura.grip_at(rod, thread.particle)?, sutura.world())));
                 let grip = match theirs.and_then(|(grip, world)| Some((grip, world.grip_pose(grip).ok()?))) {
                     Some((grip, pose)) => Grip::of(thread.entity, grip, pose),
                     None => Grip::new(thread.entity, Place::Particle(thread.particle as u32), hand.hold),
@@ -200,7 +204,13 @@ struct Found {
 }
 
 /// The thread whose picture is nearest to the line of sight.
-fn nearest_thread<'a>(sutura: &Sutura, threads: impl Iterator<Item = (Entity, &'a Thread)>, origin: DVec3, direction: DVec3, reach: f64) -> Option<Found> {
+fn nearest_thread<'a>(
+    sutura: &Sutura,
+    threads: impl Iterator<Item = (Entity, &'a Thread)>,
+    origin: DVec3,
+    direction: DVec3,
+    reach: f64,
+) -> Option<Found> {
     let mut best: Option<Found> = None;
     for (entity, thread) in threads {
         let Some(rod) = thread.handle().and_then(|h| sutura.world().rod(h).ok()) else { continue };
@@ -215,15 +225,22 @@ fn nearest_thread<'a>(sutura: &Sutura, threads: impl Iterator<Item = (Entity, &'
             let beside = (distance - rod.radius() - 0.5 * length).max(0.0) / t;
             let nearer = |b: &Found| (beside, distance) < (b.beside, (b.at - origin - direction * b.t).length());
             if beside <= reach && best.as_ref().is_none_or(nearer) {
-                best = Some(Found { entity, handle: thread.handle(), particle, t, at: *at, radius: rod.radius(), beside });
+                best =
+                    Some(Found { entity, handle: thread.handle(), particle, t, at: *at, radius: rod.radius(), beside });
             }
         }
     }
     best
 }
 
-/// The first body that the line of sight hits: entity, distance \[m\] and its position. Planes are no bodies to take, and hide nothing.
-fn nearest_body<'a>(sutura: &Sutura, bodies: impl Iterator<Item = (Entity, &'a Body)>, origin: DVec3, direction: DVec3) -> Option<(Entity, f64, DVec3)> {
+/// The first body that the line of sight hits: entity, distance \[m\] and its position. Planes are no bodies to take,
+/// and hide nothing.
+fn nearest_body<'a>(
+    sutura: &Sutura,
+    bodies: impl Iterator<Item = (Entity, &'a Body)>,
+    origin: DVec3,
+    direction: DVec3,
+) -> Option<(Entity, f64, DVec3)> {
     let mut best: Option<(Entity, f64, DVec3)> = None;
     for (entity, body) in bodies {
         let Some(shape) = body.handle().and_then(|h| sutura.world().shape(h).ok()) else { continue };

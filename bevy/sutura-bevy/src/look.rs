@@ -4,7 +4,9 @@ use crate::cloth::{uneven, wave};
 use bevy::asset::RenderAssetUsages;
 use bevy::image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor};
 use bevy::prelude::*;
-use bevy::render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension};
+use bevy::render::render_resource::{
+    Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
+};
 use core::f32::consts::{PI, TAU};
 
 /// How a thread looks.
@@ -28,7 +30,13 @@ impl ThreadLook {
     /// One of the looks for the threads of a scene, by their number.
     pub fn of(number: usize) -> Self {
         // Dyed violet, undyed and blue are the colors of suture; the rest tells further threads apart.
-        let colors = [("#7b45e0", "#f4ecff"), ("#dccb9c", "#7c4a1c"), ("#2263dc", "#e8f1ff"), ("#e0553a", "#fff0dc"), ("#c43f9a", "#fff0f6")];
+        let colors = [
+            ("#7b45e0", "#f4ecff"),
+            ("#dccb9c", "#7c4a1c"),
+            ("#2263dc", "#e8f1ff"),
+            ("#e0553a", "#fff0dc"),
+            ("#c43f9a", "#fff0f6"),
+        ];
         let (color, tracer) = colors[number % colors.len()];
         let hex = |s: &str| Srgba::hex(s).unwrap_or(Srgba::WHITE);
         ThreadLook { color: hex(color), tracer: hex(tracer), braided: true }
@@ -73,8 +81,18 @@ impl Materials {
             reflectance: 0.18,
             ..default()
         });
-        let steel = materials.add(StandardMaterial { base_color: Color::srgb(0.86, 0.87, 0.89), metallic: 1.0, perceptual_roughness: 0.26, ..default() });
-        let polished = StandardMaterial { base_color: Color::srgb(0.72, 0.74, 0.77), metallic: 1.0, perceptual_roughness: 0.24, ..default() };
+        let steel = materials.add(StandardMaterial {
+            base_color: Color::srgb(0.86, 0.87, 0.89),
+            metallic: 1.0,
+            perceptual_roughness: 0.26,
+            ..default()
+        });
+        let polished = StandardMaterial {
+            base_color: Color::srgb(0.72, 0.74, 0.77),
+            metallic: 1.0,
+            perceptual_roughness: 0.24,
+            ..default()
+        };
         let fading = materials.add(StandardMaterial { alpha_mode: AlphaMode::Blend, ..polished.clone() });
         Materials { steel, instrument: materials.add(polished), fading, drape }
     }
@@ -104,14 +122,20 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
             let t = smooth(0.06, 0.045, (u - 0.5).abs());
             mix(base, tracer, t)
         });
-        return (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.0, |_, _| 0.0), TextureFormat::Rgba8Unorm));
+        return (
+            mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb),
+            mipped(SIZE, normals(SIZE, 0.0, |_, _| 0.0), TextureFormat::Rgba8Unorm),
+        );
     }
     // Two families of strands cross; in a checkerboard one or the other is on top.
     let cell = |u: f32, v: f32| {
         let (p, q) = (CARRIERS * (u + v), CARRIERS * (u - v));
         let first = (p.floor() + q.floor()).rem_euclid(2.0) < 0.5;
-        let (across, along, number) =
-            if first { (p.rem_euclid(1.0), q.rem_euclid(1.0), p.floor()) } else { (q.rem_euclid(1.0), p.rem_euclid(1.0), q.floor() + 1000.0 * CARRIERS) };
+        let (across, along, number) = if first {
+            (p.rem_euclid(1.0), q.rem_euclid(1.0), p.floor())
+        } else {
+            (q.rem_euclid(1.0), p.rem_euclid(1.0), q.floor() + 1000.0 * CARRIERS)
+        };
         (across, along, number.rem_euclid(CARRIERS) < 0.5 && first)
     };
     let height = |u: f32, v: f32| {
@@ -124,7 +148,10 @@ fn strands(look: &ThreadLook) -> (Image, Image) {
         let shade = (0.45 + 0.55 * height(u, v)) * fibers;
         scaled(if traced { tracer } else { base }, shade)
     });
-    (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.035, height), TextureFormat::Rgba8Unorm))
+    (
+        mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb),
+        mipped(SIZE, normals(SIZE, 0.035, height), TextureFormat::Rgba8Unorm),
+    )
 }
 
 /// Color and normals of a tile of drape: a twill of yarns none of which is quite like the next.
@@ -152,13 +179,17 @@ fn drape() -> (Image, Image) {
         // Worn fibers are paler.
         mix(c, Srgba::rgb(0.42, 0.62, 0.58), 0.10 * height * own * own)
     });
-    (mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb), mipped(SIZE, normals(SIZE, 0.0007, |u, v| weave(u, v).0), TextureFormat::Rgba8Unorm))
+    (
+        mipped(SIZE, color, TextureFormat::Rgba8UnormSrgb),
+        mipped(SIZE, normals(SIZE, 0.0007, |u, v| weave(u, v).0), TextureFormat::Rgba8Unorm),
+    )
 }
 
 /// A lamp with a screen before it: direction to its middle, half its width and height (at distance 1), brightness.
 struct Screen(Vec3, f32, f32, f32);
 
-/// The light of an operating theater from all around: lamps above and by the walls in a dim room, a green table below. Diffuse and specular cube maps.
+/// The light of an operating theater from all around: lamps above and by the walls in a dim room, a green table below.
+/// Diffuse and specular cube maps.
 pub fn surroundings() -> (Image, Image) {
     let screens = [
         // Over the table; by the walls, upright; behind it, low and wide.
@@ -185,8 +216,10 @@ pub fn surroundings() -> (Image, Image) {
             }
             // A screen that is blurred is wider and fainter.
             let edge = 0.03 + 1.1 * blur;
-            let within = |x: f32, half: f32| smooth(half + edge, half - edge, x.abs() / ahead) * half / (half + 0.35 * edge);
-            sum += Vec3::new(1.0, 0.975, 0.94) * (*bright * within(d.dot(u), *width) * within(d.dot(u.cross(n)), *height));
+            let within =
+                |x: f32, half: f32| smooth(half + edge, half - edge, x.abs() / ahead) * half / (half + 0.35 * edge);
+            sum +=
+                Vec3::new(1.0, 0.975, 0.94) * (*bright * within(d.dot(u), *width) * within(d.dot(u.cross(n)), *height));
         }
         sum
     };
@@ -230,10 +263,12 @@ fn cube(size: usize, levels: usize, light: impl Fn(Vec3, f32) -> Vec3) -> Image 
         }
     }
     let extent = Extent3d { width: size as u32, height: size as u32, depth_or_array_layers: 6 };
-    let mut image = Image::new_uninit(extent, TextureDimension::D2, TextureFormat::Rgb9e5Ufloat, RenderAssetUsages::RENDER_WORLD);
+    let mut image =
+        Image::new_uninit(extent, TextureDimension::D2, TextureFormat::Rgb9e5Ufloat, RenderAssetUsages::RENDER_WORLD);
     image.data = Some(data);
     image.texture_descriptor.mip_level_count = levels as u32;
-    image.texture_view_descriptor = Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::Cube), ..default() });
+    image.texture_view_descriptor =
+        Some(TextureViewDescriptor { dimension: Some(TextureViewDimension::Cube), ..default() });
     image.sampler = ImageSampler::linear();
     image
 }
@@ -259,7 +294,8 @@ fn normals(size: usize, scale: f32, height: impl Fn(f32, f32) -> f32) -> Vec<[u8
     let one = |i: usize| {
         let (u, v) = (at(i % size), at(i / size));
         let slope = |a: f32, b: f32| scale * (b - a) / (2.0 * e);
-        let n = Vec3::new(-slope(height(u - e, v), height(u + e, v)), -slope(height(u, v - e), height(u, v + e)), 1.0).normalize();
+        let n = Vec3::new(-slope(height(u - e, v), height(u + e, v)), -slope(height(u, v - e), height(u, v + e)), 1.0)
+            .normalize();
         let byte = |x: f32| ((0.5 * x + 0.5) * 255.0).round() as u8;
         [byte(n.x), byte(n.y), byte(n.z), 255]
     };

@@ -19,7 +19,8 @@ pub struct Triangles {
 
 /// Sides of what is round.
 const SIDES: usize = 64;
-/// Part of the smaller size of a cylinder or box by which its edges are rounded: metal that is handled has no sharp edges, and a round one catches light.
+/// Part of the smaller size of a cylinder or box by which its edges are rounded: metal that is handled has no sharp
+/// edges, and a round one catches light.
 const ROUND: f64 = 0.04;
 
 impl Triangles {
@@ -28,7 +29,8 @@ impl Triangles {
         match geometry {
             Geometry::Plane => {
                 let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
-                let positions: Vec<DVec3> = corners.iter().map(|(x, y)| DVec3::new(x * plane, y * plane, 0.0)).collect();
+                let positions: Vec<DVec3> =
+                    corners.iter().map(|(x, y)| DVec3::new(x * plane, y * plane, 0.0)).collect();
                 let uvs = positions.iter().map(|p| [p.x, p.y]).collect();
                 Triangles { positions, normals: vec![DVec3::Z; 4], uvs, indices: vec![[0, 1, 2], [0, 2, 3]] }
             }
@@ -82,7 +84,8 @@ impl Triangles {
         }
     }
 
-    /// A box with rounded edges: each face a grid that is pressed onto the smaller box within and blown up by the radius of the edge.
+    /// A box with rounded edges: each face a grid that is pressed onto the smaller box within and blown up by the
+    /// radius of the edge.
     fn boxed(half: DVec3) -> Triangles {
         let edge = ROUND * 2.0 * half.min_element();
         let inner = half - edge;
@@ -200,7 +203,10 @@ mod tests {
                 let [a, b, c] = i.map(|k| t.positions[k as usize]);
                 let n = (b - a).cross(c - a);
                 // A triangle at a pole has no area.
-                assert!(n.length() < 1e-12 || i.iter().all(|k| n.normalize().dot(t.normals[*k as usize]) > 0.7), "{geometry:?}");
+                assert!(
+                    n.length() < 1e-12 || i.iter().all(|k| n.normalize().dot(t.normals[*k as usize]) > 0.7),
+                    "{geometry:?}"
+                );
             }
         }
     }

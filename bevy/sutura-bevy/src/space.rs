@@ -4,8 +4,9 @@ use bevy::prelude::*;
 use sutura::Pose;
 use sutura::glam::{DQuat, DVec3};
 
-/// How meters and axes of the engine become Bevy's. By default a centimeter becomes a unit, since shadows and depth of a renderer are made for
-/// things of about that size, and up is the engine's z (against its default gravity) as well as Bevy's y.
+/// How meters and axes of the engine become Bevy's. By default a centimeter becomes a unit, since shadows and depth of
+/// a renderer are made for things of about that size, and up is the engine's z (against its default gravity) as well as
+/// Bevy's y.
 #[derive(Resource, Debug, Clone, Copy, PartialEq)]
 pub struct Space {
     /// Units in a meter, > 0.

@@ -49,9 +49,10 @@ pub struct Limits {
     pub speed: f64,
     /// Fastest that it turns \[rad/s\].
     pub turn: f64,
-    /// Whether it gives way, as a hand does: it moves with no more than `force`, slower by the part of that which it meets, and then turns with no more
-    /// than `torque`. One that does not is a machine: it moves and turns whatever the force, and a thread that cannot follow gets stuck. (In a world
-    /// of the paper's solver, which knows no such drive, everything is a machine.)
+    /// Whether it gives way, as a hand does: it moves with no more than `force`, slower by the part of that which it
+    /// meets, and then turns with no more than `torque`. One that does not is a machine: it moves and turns whatever
+    /// the force, and a thread that cannot follow gets stuck. (In a world of the paper's solver, which knows no such
+    /// drive, everything is a machine.)
     pub yields: bool,
     /// Greatest force of one that yields \[N\].
     pub force: f64,
@@ -77,7 +78,8 @@ enum Go {
 }
 
 impl Limits {
-    /// What is done in one of `frames` frames of `dt` \[s\] in which something at `now` that acts with a force and torque would like to reach its target.
+    /// What is done in one of `frames` frames of `dt` \[s\] in which something at `now` that acts with a force and
+    /// torque would like to reach its target.
     fn go(&self, now: Pose, acting: Wrench, target: Option<Pose>, dt: f64, frames: u32) -> Go {
         let strained = acting.force.length() > OVER * self.force;
         if self.yields
@@ -100,7 +102,10 @@ impl Limits {
         {
             turn *= (1.0 - acting.torque.dot(axis) / self.torque).clamp(0.0, 1.0);
         }
-        let next = Pose::new(if self.yields { now.position } else { now.position + way }, (exp(turn) * now.orientation).normalize());
+        let next = Pose::new(
+            if self.yields { now.position } else { now.position + way },
+            (exp(turn) * now.orientation).normalize(),
+        );
         if next == now { Go::Stay } else { Go::Lead(next) }
     }
 }
@@ -185,8 +190,8 @@ pub struct Grip {
     thread: Entity,
     place: Place,
     hold: Hold,
-    /// Where it is to be \[m\]: it is there at the end of the frames of physics of the same drawn frame, unless a limit is reached. `None` lets it
-    /// hold where it is.
+    /// Where it is to be \[m\]: it is there at the end of the frames of physics of the same drawn frame, unless a limit
+    /// is reached. `None` lets it hold where it is.
     pub target: Option<Pose>,
     /// How it goes there.
     pub limits: Limits,
@@ -261,7 +266,12 @@ fn toward(from: DQuat, to: DQuat, part: f64) -> DQuat {
 }
 
 /// Puts what was spawned into the world.
-pub(crate) fn take_up(mut sutura: ResMut<Sutura>, mut threads: Query<&mut Thread>, mut bodies: Query<&mut Body>, mut grips: Query<&mut Grip>) {
+pub(crate) fn take_up(
+    mut sutura: ResMut<Sutura>,
+    mut threads: Query<&mut Thread>,
+    mut bodies: Query<&mut Body>,
+    mut grips: Query<&mut Grip>,
+) {
     for mut thread in threads.iter_mut().filter(|t| t.spec.is_some()) {
         let Some(spec) = thread.spec.take() else { continue };
         match sutura.edit().insert_rod(&spec) {
@@ -296,11 +306,17 @@ pub(crate) fn take_up(mut sutura: ResMut<Sutura>, mut threads: Query<&mut Thread
 }
 
 /// One frame of physics: what is held goes toward its target, the world is stepped, and forces are read.
-pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bodies: Query<&mut Body>, mut grips: Query<&mut Grip>) {
+pub(crate) fn step(
+    mut sutura: ResMut<Sutura>,
+    clock: Res<PhysicsClock>,
+    mut bodies: Query<&mut Body>,
+    mut grips: Query<&mut Grip>,
+) {
     let (dt, frames) = (clock.frame, clock.remaining);
     let machines = matches!(sutura.world().settings().solver, Solver::Paper(_));
     let allowed = |limits: Limits| Limits { yields: limits.yields && !machines, ..limits };
-    // Both lists: where each is now, and where it is led. A handle may have gone stale by what the simulation did; then there is nothing to move.
+    // Both lists: where each is now, and where it is led. A handle may have gone stale by what the simulation did; then
+    // there is nothing to move.
     let mut led: Vec<(Part, Pose, Pose)> = Vec::new();
     for mut grip in &mut grips {
         let Some(handle) = grip.handle else { continue };
@@ -365,7 +381,9 @@ pub(crate) fn step(mut sutura: ResMut<Sutura>, clock: Res<PhysicsClock>, mut bod
     });
     for mut grip in &mut grips {
         let Some(handle) = grip.handle else { continue };
-        if let Ok((pose, wrench)) = sutura.world().grip_pose(handle).and_then(|p| Ok((p, sutura.world().grip_wrench(handle)?))) {
+        if let Ok((pose, wrench)) =
+            sutura.world().grip_pose(handle).and_then(|p| Ok((p, sutura.world().grip_wrench(handle)?)))
+        {
             // A pin has no orientation of its own, and keeps the one that it was given.
             let turned = if grip.hold == Hold::Pin { grip.pose.orientation } else { pose.orientation };
             (grip.pose, grip.wrench) = (Pose::new(pose.position, turned), wrench);
@@ -417,12 +435,21 @@ mod tests {
         assert_eq!(limits.go(Pose::IDENTITY, none, None, 0.01, 1), Go::Stay);
         assert_eq!(machine.go(Pose::IDENTITY, none, to(DVec3::X), 0.01, 1), Go::Lead(Pose::at(DVec3::X * 0.01)));
         assert_eq!(machine.go(Pose::IDENTITY, none, to(DVec3::X), 10.0, 4), Go::Lead(Pose::at(DVec3::X * 0.25)));
-        assert_eq!(limits.go(Pose::IDENTITY, none, to(DVec3::X), 10.0, 4), Go::Push { direction: DVec3::X, force: limits.force, speed_limit: 0.025 });
+        assert_eq!(
+            limits.go(Pose::IDENTITY, none, to(DVec3::X), 10.0, 4),
+            Go::Push { direction: DVec3::X, force: limits.force, speed_limit: 0.025 }
+        );
         assert_eq!(limits.go(Pose::IDENTITY, none, to(DVec3::ZERO), 0.01, 1), Go::Stay);
         // Drawn harder than it may hold: along the pull, whatever it is to do.
         let strained = Wrench { force: DVec3::Y * 6.0, ..none };
         let gives = Go::Push { direction: DVec3::Y, force: limits.force, speed_limit: limits.speed };
-        assert_eq!((limits.go(Pose::IDENTITY, strained, None, 0.01, 1), limits.go(Pose::IDENTITY, strained, to(DVec3::X), 0.01, 1)), (gives, gives));
+        assert_eq!(
+            (
+                limits.go(Pose::IDENTITY, strained, None, 0.01, 1),
+                limits.go(Pose::IDENTITY, strained, to(DVec3::X), 0.01, 1)
+            ),
+            (gives, gives)
+        );
         // It turns slower by the part of its torque that it meets, and not at all against all of it.
         let turned = Some(Pose::new(DVec3::ZERO, DQuat::from_rotation_z(1.0)));
         for (met, angle) in [(0.0, 0.1), (0.25, 0.075), (1.0, 0.0), (2.0, 0.0), (-1.0, 0.1)] {

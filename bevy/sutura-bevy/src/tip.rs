@@ -9,7 +9,8 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use sutura::Pose;
 use sutura::glam::{DMat3, DQuat, DVec3};
 
-/// The tip of a needle holder, closed on a thread. Its [`Transform`] is set by whoever spawned it, for which [`Tip::pose`] helps.
+/// The tip of a needle holder, closed on a thread. Its [`Transform`] is set by whoever spawned it, for which
+/// [`Tip::pose`] helps.
 #[derive(Component, Debug, Clone, Copy, PartialEq)]
 #[require(Transform, Visibility)]
 pub struct Tip {
@@ -19,7 +20,8 @@ pub struct Tip {
     pub band: Srgba,
 }
 
-/// From the middle of what is held to the end of the jaws, to their joint, to the band, to its end, to where the shaft has faded away \[m\].
+/// From the middle of what is held to the end of the jaws, to their joint, to the band, to its end, to where the shaft
+/// has faded away \[m\].
 const ENDS: f64 = -0.9e-3;
 const JOINT: f64 = 8.6e-3;
 const BAND: f64 = 13.0e-3;
@@ -31,7 +33,8 @@ const SHAFT: f64 = 1.05e-3;
 const SIDES: usize = 28;
 
 impl Tip {
-    /// Where it is when it holds a thread that runs along `tangent` at a place \[m\], with the hand in a direction from there.
+    /// Where it is when it holds a thread that runs along `tangent` at a place \[m\], with the hand in a direction from
+    /// there.
     pub fn pose(at: DVec3, tangent: DVec3, hand: DVec3) -> Pose {
         let y = hand.normalize_or(DVec3::Z);
         // The jaws close across the thread; where it runs along them any way will do.
@@ -47,11 +50,24 @@ impl Tip {
             jaw(&mut out, self.bore, side);
         }
         // The joint with its pin, and the beginning of the shaft.
-        let neck = [(JOINT - 0.4e-3, 0.3e-3), (JOINT - 0.2e-3, 0.95e-3), (JOINT + 0.4e-3, 1.12e-3), (JOINT + 2.0e-3, 1.12e-3), (JOINT + 2.5e-3, 0.86e-3)];
+        let neck = [
+            (JOINT - 0.4e-3, 0.3e-3),
+            (JOINT - 0.2e-3, 0.95e-3),
+            (JOINT + 0.4e-3, 1.12e-3),
+            (JOINT + 2.0e-3, 1.12e-3),
+            (JOINT + 2.5e-3, 0.86e-3),
+        ];
         turned(&mut out, DVec3::Y, DVec3::ZERO, &neck);
         let shaft = [(JOINT + 2.5e-3, 0.86e-3), (JOINT + 3.1e-3, 0.86e-3), (JOINT + 3.3e-3, SHAFT), (BAND, SHAFT)];
         turned(&mut out, DVec3::Y, DVec3::ZERO, &shaft);
-        let pin = [(-1.34e-3, 0.0), (-1.32e-3, 0.42e-3), (-1.22e-3, 0.52e-3), (1.22e-3, 0.52e-3), (1.32e-3, 0.42e-3), (1.34e-3, 0.0)];
+        let pin = [
+            (-1.34e-3, 0.0),
+            (-1.32e-3, 0.42e-3),
+            (-1.22e-3, 0.52e-3),
+            (1.22e-3, 0.52e-3),
+            (1.32e-3, 0.42e-3),
+            (1.34e-3, 0.0),
+        ];
         turned(&mut out, DVec3::Z, DVec3::Y * (JOINT + 0.7e-3), &pin);
         out
     }
@@ -60,14 +76,20 @@ impl Tip {
     fn band(&self) -> Triangles {
         let mut out = Triangles::default();
         let bulge = 0.12e-3;
-        turned(&mut out, DVec3::Y, DVec3::ZERO, &[(BAND, SHAFT), (BAND + bulge, SHAFT + bulge), (BAND_END - bulge, SHAFT + bulge), (BAND_END, SHAFT)]);
+        turned(
+            &mut out,
+            DVec3::Y,
+            DVec3::ZERO,
+            &[(BAND, SHAFT), (BAND + bulge, SHAFT + bulge), (BAND_END - bulge, SHAFT + bulge), (BAND_END, SHAFT)],
+        );
         out
     }
 
     /// The rest of the shaft, which fades away, and how much of it is there at each corner.
     fn rest(&self) -> (Triangles, Vec<[f32; 4]>) {
         let mut out = Triangles::default();
-        let rows: Vec<(f64, f64)> = (0..=12).map(|k| (BAND_END + (GONE - BAND_END) * f64::from(k) / 12.0, SHAFT)).collect();
+        let rows: Vec<(f64, f64)> =
+            (0..=12).map(|k| (BAND_END + (GONE - BAND_END) * f64::from(k) / 12.0, SHAFT)).collect();
         turned(&mut out, DVec3::Y, DVec3::ZERO, &rows);
         let there = |p: &DVec3| {
             let t = ((GONE - p.y) / (GONE - BAND_END)).clamp(0.0, 1.0) as f32;
@@ -78,7 +100,8 @@ impl Tip {
     }
 }
 
-/// One of the two jaws: half round outside, flat within, the flats as far apart as the thread is thick where it lies between them.
+/// One of the two jaws: half round outside, flat within, the flats as far apart as the thread is thick where it lies
+/// between them.
 fn jaw(out: &mut Triangles, bore: f64, side: f64) {
     // Along the jaw, thickness, half width.
     let stations = [
@@ -123,10 +146,15 @@ fn surface(out: &mut Triangles, rows: usize, columns: usize, at: impl Fn(usize, 
         for k in 0..=columns {
             let (i0, i1) = (i.saturating_sub(1), (i + 1).min(rows - 1));
             // Around a pole the row itself has no extent; its neighbor tells the normal.
-            let row = if (at(i, 0) - at(i, columns / 2)).length() < 1e-9 { if i == 0 { 1 } else { rows - 2 } } else { i };
+            let row =
+                if (at(i, 0) - at(i, columns / 2)).length() < 1e-9 { if i == 0 { 1 } else { rows - 2 } } else { i };
             // What is closed has neighbors on both sides of its seam.
             let closed = columns > 1 && (at(row, 0) - at(row, columns)).length() < 1e-9;
-            let (k0, k1) = if closed { ((k + columns - 1) % columns, (k + 1) % columns) } else { (k.saturating_sub(1), (k + 1).min(columns)) };
+            let (k0, k1) = if closed {
+                ((k + columns - 1) % columns, (k + 1) % columns)
+            } else {
+                (k.saturating_sub(1), (k + 1).min(columns))
+            };
             let normal = (at(row, k1) - at(row, k0)).cross(at(i1, k) - at(i0, k)).normalize_or(DVec3::Y);
             out.positions.push(at(i, k));
             out.normals.push(normal);
@@ -158,7 +186,12 @@ pub(crate) fn mesh_tips(
         let solid = meshes.add(plain(&tip.triangles()));
         let band = meshes.add(plain(&tip.band()));
         let rest = meshes.add(plain(&rest).with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, there));
-        let painted = materials.add(StandardMaterial { base_color: tip.band.into(), metallic: 0.6, perceptual_roughness: 0.35, ..default() });
+        let painted = materials.add(StandardMaterial {
+            base_color: tip.band.into(),
+            metallic: 0.6,
+            perceptual_roughness: 0.35,
+            ..default()
+        });
         commands.spawn((Mesh3d(solid), MeshMaterial3d(shared.instrument.clone()), ChildOf(entity)));
         commands.spawn((Mesh3d(band), MeshMaterial3d(painted), ChildOf(entity)));
         commands.spawn((Mesh3d(rest), MeshMaterial3d(shared.fading.clone()), NotShadowCaster, ChildOf(entity)));
@@ -173,8 +206,14 @@ mod tests {
     fn its_jaws_close_on_the_thread_and_its_surface_looks_outward() {
         let tip = Tip { bore: 0.3e-3, band: Srgba::WHITE };
         let solid = tip.triangles();
-        let volume: f64 = solid.indices.iter().map(|t| t.map(|i| solid.positions[i as usize])).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
-        // It is open where the band begins; a disk there closes it. A jaw is about a half cone with a radius from 0.5 to 1 mm; the shaft has 1 mm.
+        let volume: f64 = solid
+            .indices
+            .iter()
+            .map(|t| t.map(|i| solid.positions[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
+        // It is open where the band begins; a disk there closes it. A jaw is about a half cone with a radius from 0.5
+        // to 1 mm; the shaft has 1 mm.
         let volume = volume + BAND * PI * SHAFT * SHAFT / 3.0;
         assert!(volume > 2e-8 && volume < 6e-8, "{volume}");
         let wrong = solid.indices.iter().filter(|t| {

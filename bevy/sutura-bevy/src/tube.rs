@@ -15,8 +15,8 @@ pub(crate) struct Part {
     pub indices: Vec<u32>,
 }
 
-/// Cuts a skin. Its triangles are in order along the thread, so a part is full when the next triangle would bring a bone too many. What two parts
-/// share is in both, moved by the same bones: no seam is seen.
+/// Cuts a skin. Its triangles are in order along the thread, so a part is full when the next triangle would bring a
+/// bone too many. What two parts share is in both, moved by the same bones: no seam is seen.
 pub(crate) fn parts(skin: &Skin, most: usize) -> Vec<Part> {
     let mut out = vec![Part::default()];
     let mut bone_at: Vec<Option<u16>> = vec![None; skin.n_bones()];
@@ -26,7 +26,8 @@ pub(crate) fn parts(skin: &Skin, most: usize) -> Vec<Part> {
         skin.joints()[v].into_iter().zip(skin.weights()[v]).filter(|(_, w)| *w > 0.0).map(|(b, _)| b)
     };
     for triangle in &skin.mesh().triangles {
-        let mut fresh: Vec<u16> = triangle.iter().flat_map(|v| bones_of(*v)).filter(|b| bone_at[usize::from(*b)].is_none()).collect();
+        let mut fresh: Vec<u16> =
+            triangle.iter().flat_map(|v| bones_of(*v)).filter(|b| bone_at[usize::from(*b)].is_none()).collect();
         fresh.sort_unstable();
         fresh.dedup();
         if out[out.len() - 1].bones.len() + fresh.len() > most {
@@ -40,7 +41,9 @@ pub(crate) fn parts(skin: &Skin, most: usize) -> Vec<Part> {
             let v = *corner as usize;
             let index = vertex_at[v].unwrap_or_else(|| {
                 let mut joints = [0; 4];
-                for (joint, (bone, weight)) in joints.iter_mut().zip(skin.joints()[v].into_iter().zip(skin.weights()[v])) {
+                for (joint, (bone, weight)) in
+                    joints.iter_mut().zip(skin.joints()[v].into_iter().zip(skin.weights()[v]))
+                {
                     if weight > 0.0 {
                         *joint = *bone_at[usize::from(bone)].get_or_insert_with(|| {
                             part.bones.push(bone);
@@ -78,7 +81,8 @@ mod tests {
                 }
             }
         }
-        let corners = parts.iter().flat_map(|p| p.indices.iter().map(|i| p.vertices[*i as usize])).collect::<Vec<u32>>();
+        let corners =
+            parts.iter().flat_map(|p| p.indices.iter().map(|i| p.vertices[*i as usize])).collect::<Vec<u32>>();
         assert_eq!(corners, skin.mesh().triangles.iter().flatten().copied().collect::<Vec<u32>>());
     }
 }

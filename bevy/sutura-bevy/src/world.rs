@@ -15,7 +15,8 @@ pub enum Part {
     Body(Handle<Shape>),
 }
 
-/// What is stepped: a world, or something that holds one and does more in a frame of it (a scene with motions of its own).
+/// What is stepped: a world, or something that holds one and does more in a frame of it (a scene with motions of its
+/// own).
 pub trait Simulation: Any + Send + Sync {
     /// Reads the world.
     fn world(&self) -> &World;
@@ -23,13 +24,14 @@ pub trait Simulation: Any + Send + Sync {
     fn edit(&mut self) -> &mut Recorder;
     /// What was done to it, if it records.
     fn recording(&self) -> Option<&Recording>;
-    /// One frame of physics of `dt` \[s\]. It may be done in pieces; before each `drive` is to be called with the part of the frame that will be
-    /// done with that piece, in (0, 1]. What went wrong comes back.
+    /// One frame of physics of `dt` \[s\]. It may be done in pieces; before each `drive` is to be called with the part
+    /// of the frame that will be done with that piece, in (0, 1]. What went wrong comes back.
     fn step(&mut self, dt: f64, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident>;
-    /// Limits the work of each frame from now on, or no longer ([`World::set_step_work`]): one that has spent it ends early, with less time simulated.
+    /// Limits the work of each frame from now on, or no longer ([`World::set_step_work`]): one that has spent it ends
+    /// early, with less time simulated.
     fn limit_work(&mut self, most: Option<f64>);
-    /// A hand takes a thing that was in the world before (`held`), or lets go of it. Whether the simulation sees to what moves it from then on; else a
-    /// body that is let go is moved by what moved it before.
+    /// A hand takes a thing that was in the world before (`held`), or lets go of it. Whether the simulation sees to
+    /// what moves it from then on; else a body that is let go is moved by what moved it before.
     fn hold(&mut self, _part: Part, _held: bool) -> bool {
         false
     }
@@ -66,7 +68,8 @@ impl Simulation for Recorder {
 #[derive(Resource)]
 pub struct Sutura {
     simulation: Box<dyn Simulation>,
-    /// What went wrong in the last frame of physics. A step never fails: where it found no way it stands still and says so here.
+    /// What went wrong in the last frame of physics. A step never fails: where it found no way it stands still and says
+    /// so here.
     pub incidents: Vec<Incident>,
     /// Work in a millisecond, as measured lately.
     work_per_ms: f64,
@@ -124,7 +127,8 @@ impl Sutura {
     pub(crate) fn grip_at(&self, thread: Handle<Rod>, particle: usize) -> Option<Handle<sutura::Grip>> {
         self.simulation.grip_at(thread, particle)
     }
-    /// A frame of physics of `dt` \[s\], which ends early where it would take longer than `most`. The engine counts work; what a count takes here is measured.
+    /// A frame of physics of `dt` \[s\], which ends early where it would take longer than `most`. The engine counts
+    /// work; what a count takes here is measured.
     pub(crate) fn step(&mut self, dt: f64, most: Option<Duration>, drive: &mut dyn FnMut(&mut Recorder, f64)) {
         let most = most.map(|most| most.as_secs_f64() * 1e3 * self.work_per_ms);
         self.simulation.limit_work(most);

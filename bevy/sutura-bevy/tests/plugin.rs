@@ -6,8 +6,13 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 use sutura_bevy::sutura::glam::{DQuat, DVec3};
 use sutura_bevy::sutura::input::Recording;
-use sutura_bevy::sutura::{Geometry, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch};
-use sutura_bevy::{Body, Grip, Hand, Held, PhysicsClock, PhysicsFrame, PhysicsSet, Pointer, PointerCamera, Space, Sutura, SuturaPlugin, Thread, sutura};
+use sutura_bevy::sutura::{
+    Geometry, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, Stretch,
+};
+use sutura_bevy::{
+    Body, Grip, Hand, Held, PhysicsClock, PhysicsFrame, PhysicsSet, Pointer, PointerCamera, Space, Sutura,
+    SuturaPlugin, Thread, sutura,
+};
 
 /// An app whose pictures take as long as they are told to.
 fn app() -> App {
@@ -27,7 +32,13 @@ fn picture(app: &mut App, seconds: f64) {
 
 /// 10 cm of thread along x, 40 elements, its start pinned.
 fn thread(app: &mut App) -> Entity {
-    let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 40, 0.2e-3, Material { bend_damping: 0.01, ..Material::elastic(1e9, 1150.0) });
+    let spec = RodSpec::straight(
+        DVec3::ZERO,
+        DVec3::X * 0.1,
+        40,
+        0.2e-3,
+        Material { bend_damping: 0.01, ..Material::elastic(1e9, 1150.0) },
+    );
     let thread = app.world_mut().spawn(Thread::new(spec)).id();
     app.world_mut().spawn(Grip::new(thread, Place::Start, Hold::Pin));
     thread
@@ -57,19 +68,22 @@ fn the_hand_takes_a_thread_pulls_and_lets_go() {
     look_at(&mut app, start, true);
     picture(&mut app, 1.0 / 60.0);
     assert!(matches!(app.world().resource::<Hand>().held, Some(Held::Thread(_))));
-    // Drawn 2 cm up over half a second, a little slack: each picture's place is reached in the physics of the same picture.
+    // Drawn 2 cm up over half a second, a little slack: each picture's place is reached in the physics of the same
+    // picture.
     for k in 1..=30 {
         let turn = 0.2 * f64::from(k) / 30.0;
         let at = DVec3::new(turn.cos(), 0.0, turn.sin()) * (0.1 - 0.0005 * (f64::from(k) / 5.0).min(1.0));
         look_at(&mut app, at, true);
         picture(&mut app, 1.0 / 60.0);
-        // The first of these may still close what taking hold over 20 ms left. A hand that yields by 5 N hardly feels the weight of a thread.
+        // The first of these may still close what taking hold over 20 ms left. A hand that yields by 5 N hardly feels
+        // the weight of a thread.
         if k > 3 {
             let off = (end_of(&app, thread) - at).length();
             assert!(off < 0.01 * 0.02 / 30.0, "{off} m off the target in picture {k}");
         }
     }
-    // Pulled against the pin: 2 mm more than its length along the line from there. It hardly stretches, so the force is the limit's.
+    // Pulled against the pin: 2 mm more than its length along the line from there. It hardly stretches, so the force is
+    // the limit's.
     let limit = app.world().resource::<Hand>().force_limit;
     let straight = DVec3::new(0.2f64.cos(), 0.0, 0.2f64.sin());
     for k in 1..=60 {
@@ -101,7 +115,8 @@ fn lead(app: &mut App, grip: Entity, frames: u32, way: impl Fn(&Grip) -> (DVec3,
         let mut g = app.world_mut().get_mut::<Grip>(grip).unwrap();
         let ((step, turn), pose) = (way(&g), g.pose());
         let about = DQuat::from_axis_angle(pose.orientation * DVec3::Z, turn);
-        g.target = (step != DVec3::ZERO || turn != 0.0).then(|| Pose::new(pose.position + step, (about * pose.orientation).normalize()));
+        g.target = (step != DVec3::ZERO || turn != 0.0)
+            .then(|| Pose::new(pose.position + step, (about * pose.orientation).normalize()));
         picture(app, 1.0 / 60.0);
         most = most.max(app.world().get::<Grip>(grip).unwrap().force());
         incidents += app.world().resource::<Sutura>().incidents.len();
@@ -112,7 +127,13 @@ fn lead(app: &mut App, grip: Entity, frames: u32, way: impl Fn(&Grip) -> (DVec3,
 #[test]
 fn a_thread_that_does_not_stretch_is_pulled_no_harder_than_the_limit() {
     let mut app = app();
-    let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 40, 0.2e-3, Material { bend_damping: 0.01, ..Material::elastic(1e9, 1150.0) });
+    let spec = RodSpec::straight(
+        DVec3::ZERO,
+        DVec3::X * 0.1,
+        40,
+        0.2e-3,
+        Material { bend_damping: 0.01, ..Material::elastic(1e9, 1150.0) },
+    );
     let thread = app.world_mut().spawn(Thread::new(RodSpec { stretch: Stretch::Inextensible, ..spec })).id();
     app.world_mut().spawn(Grip::new(thread, Place::Start, Hold::Pin));
     let limit = 2.0;
@@ -147,7 +168,8 @@ fn a_post_drawn_against_a_taut_thread_stops_at_the_limit() {
     lead(&mut app, end, 30, |_| (DVec3::X * -0.002 / 60.0, 0.0));
     let across = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     let post = Geometry::Cylinder { radius: 0.003, half_length: 0.01 };
-    let post = app.world_mut().spawn(Body::new(ShapeSpec::fixed(post, Pose::new(DVec3::new(0.05, 0.0, 0.006), across)))).id();
+    let post =
+        app.world_mut().spawn(Body::new(ShapeSpec::fixed(post, Pose::new(DVec3::new(0.05, 0.0, 0.006), across)))).id();
     // The pins are a vise, the hand is not.
     app.world_mut().query::<&mut Grip>().iter_mut(app.world_mut()).for_each(|mut grip| grip.limits.yields = false);
     picture(&mut app, 1.0 / 60.0);
@@ -191,14 +213,19 @@ fn a_mouse_event_moves_the_grip_in_the_physics_of_the_same_picture() {
     app.add_plugins(InputPlugin);
     let thread = thread(&mut app);
     let (width, height) = (600, 400);
-    let window = app.world_mut().spawn((Window { resolution: WindowResolution::new(width, height), ..default() }, PrimaryWindow)).id();
+    let window = app
+        .world_mut()
+        .spawn((Window { resolution: WindowResolution::new(width, height), ..default() }, PrimaryWindow))
+        .id();
     // A camera that looks along -y of the engine, as Bevy would set it up for this window.
     let space = *app.world().resource::<Space>();
-    let place = Transform::from_translation(space.place(DVec3::new(0.1, -0.3, 0.0))).looking_at(space.place(DVec3::X * 0.1), Vec3::Y);
+    let place = Transform::from_translation(space.place(DVec3::new(0.1, -0.3, 0.0)))
+        .looking_at(space.place(DVec3::X * 0.1), Vec3::Y);
     let mut camera = Camera::default();
     let lens = PerspectiveProjection { aspect_ratio: width as f32 / height as f32, ..default() };
     camera.computed.clip_from_view = bevy::camera::CameraProjection::get_clip_from_view(&lens);
-    camera.computed.target_info = Some(bevy::camera::RenderTargetInfo { physical_size: UVec2::new(width, height), scale_factor: 1.0 });
+    camera.computed.target_info =
+        Some(bevy::camera::RenderTargetInfo { physical_size: UVec2::new(width, height), scale_factor: 1.0 });
     app.world_mut().spawn((camera, GlobalTransform::from(place), PointerCamera));
     picture(&mut app, 1.0 / 60.0);
     picture(&mut app, 1.0 / 60.0);
@@ -263,7 +290,8 @@ fn the_hand_takes_a_body_and_leaves_what_is_out_of_reach() {
 #[test]
 fn physics_keeps_real_time_at_any_rate_of_pictures() {
     // Pictures of 3 ms to 0.4 s, in any order, add up to two seconds.
-    let pictures: Vec<f64> = [0.003, 0.4, 0.016, 0.05, 0.1, 0.007, 0.2, 0.011, 0.033, 0.18].into_iter().cycle().take(20).collect();
+    let pictures: Vec<f64> =
+        [0.003, 0.4, 0.016, 0.05, 0.1, 0.007, 0.2, 0.011, 0.033, 0.18].into_iter().cycle().take(20).collect();
     let total: f64 = pictures.iter().sum();
     assert!((total - 2.0).abs() < 1e-12);
     let mut app = app();
@@ -274,26 +302,34 @@ fn physics_keeps_real_time_at_any_rate_of_pictures() {
     for seconds in pictures {
         picture(&mut app, seconds);
         real += seconds;
-        let (time, frame) = (app.world().resource::<Sutura>().world().time(), app.world().resource::<PhysicsClock>().frame);
+        let (time, frame) =
+            (app.world().resource::<Sutura>().world().time(), app.world().resource::<PhysicsClock>().frame);
         assert!(real - time > -1e-9 && real - time < frame + 1e-9, "{real} {time}");
     }
     assert_eq!(app.world().resource::<PhysicsClock>().lost, 0.0);
     assert_eq!(app.world().resource::<PhysicsClock>().frames, 120);
 }
 
-/// The end of a thread is led by a script that counts frames of physics, as a recorded input does. 3 s in pictures of these lengths, over and over;
-/// the state and how much time physics is behind at most.
+/// The end of a thread is led by a script that counts frames of physics, as a recorded input does. 3 s in pictures of
+/// these lengths, over and over; the state and how much time physics is behind at most.
 fn led(pictures: &[f64]) -> (u64, f64, u64) {
     let mut app = app();
     let thread = thread(&mut app);
     // What is put in is recorded input: a pose for each frame of physics, by its number.
     app.add_systems(
         PhysicsFrame,
-        (move |clock: Res<PhysicsClock>, mut sutura: ResMut<Sutura>, threads: Query<&Thread>, mut grip: Local<Option<Handle<sutura::Grip>>>| {
+        (move |clock: Res<PhysicsClock>,
+               mut sutura: ResMut<Sutura>,
+               threads: Query<&Thread>,
+               mut grip: Local<Option<Handle<sutura::Grip>>>| {
             let rod = threads.get(thread).unwrap().handle().unwrap();
-            let grip = *grip.get_or_insert_with(|| sutura.edit().insert_grip(&GripSpec::new(rod, Place::End, Hold::Pin)).unwrap());
+            let grip = *grip
+                .get_or_insert_with(|| sutura.edit().insert_grip(&GripSpec::new(rod, Place::End, Hold::Pin)).unwrap());
             let turn = 0.05 * clock.frames as f64;
-            sutura.edit().set_grip_pose(grip, Pose::at(DVec3::new(0.09 + 0.01 * turn.cos(), 0.0, 0.02 * turn.sin()))).unwrap();
+            sutura
+                .edit()
+                .set_grip_pose(grip, Pose::at(DVec3::new(0.09 + 0.01 * turn.cos(), 0.0, 0.02 * turn.sin())))
+                .unwrap();
         })
         .in_set(PhysicsSet::Drive),
     );
@@ -344,7 +380,14 @@ fn what_a_player_did_is_done_again_to_the_same_bit() {
         let turn = f64::from(k) * 0.2;
         look_at(&mut app, DVec3::new(0.1 + 0.01 * turn.cos(), 0.0, 0.02 * turn.sin()), (5..50).contains(&k));
         if k == 20 {
-            ball = Some(app.world_mut().spawn(Body::new(ShapeSpec::fixed(Geometry::Sphere { radius: 0.005 }, Pose::at(DVec3::new(0.05, 0.0, -0.007))))).id());
+            ball = Some(
+                app.world_mut()
+                    .spawn(Body::new(ShapeSpec::fixed(
+                        Geometry::Sphere { radius: 0.005 },
+                        Pose::at(DVec3::new(0.05, 0.0, -0.007)),
+                    )))
+                    .id(),
+            );
         }
         if let Some(ball) = ball.take_if(|_| k == 40) {
             app.world_mut().despawn(ball);

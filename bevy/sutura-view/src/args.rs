@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 /// Shows scenes and recorded trajectories of surgical thread.
 ///
-/// In the window: drag threads and bodies with the left mouse button, turn the view with the right one, F1 for the keys.
+/// In the window: drag threads and bodies with the left mouse button, turn the view with the right one, F1 for the
+/// keys.
 #[derive(Parser, Debug, Clone, Default)]
 #[command(
     version,
@@ -49,7 +50,8 @@ pub struct Args {
     /// Least width at which a thread is drawn, in pixels; 0 draws it as thin as it is.
     #[arg(long, default_value_t = 3.0, value_name = "PIXELS")]
     pub least_width: f32,
-    /// Try the window: whether time goes on with all panels shown, files are written and opened, keys and mouse do what they should; then close it.
+    /// Try the window: whether time goes on with all panels shown, files are written and opened, keys and mouse do what
+    /// they should; then close it.
     #[arg(long = "try", conflicts_with = "headless")]
     pub trial: bool,
     /// Begin paused.
@@ -64,7 +66,8 @@ fn size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn point(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|s| s.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|s| s.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
     numbers.and_then(|n| n.try_into().ok()).ok_or("three coordinates in meters, such as 0,0.01,0".into())
 }
 

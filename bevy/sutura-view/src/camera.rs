@@ -40,13 +40,27 @@ impl Orbit {
         Orbit { target, distance, direction, up, reach: distance, home: (target, distance, direction, up) }
     }
 
-    /// Looks from `from` (a direction from the point to the eye) at the points, all of them, or at a point with a width.
-    pub fn fitted(points: &[Vec3], from: Vec3, up: Vec3, at: Option<Vec3>, width: Option<f32>, aspect: f32, zoom: f32) -> Self {
+    /// Looks from `from` (a direction from the point to the eye) at the points, all of them, or at a point with a
+    /// width.
+    pub fn fitted(
+        points: &[Vec3],
+        from: Vec3,
+        up: Vec3,
+        at: Option<Vec3>,
+        width: Option<f32>,
+        aspect: f32,
+        zoom: f32,
+    ) -> Self {
         let mut orbit = Orbit::new(Vec3::ZERO, 10.0, from, up);
         let (back, right) = (orbit.direction, orbit.right());
         let above = back.cross(right);
         let tan = (0.5 * FIELD).tan();
-        let bounds = |axis: Vec3| points.iter().map(|p| p.dot(axis)).fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+        let bounds = |axis: Vec3| {
+            points
+                .iter()
+                .map(|p| p.dot(axis))
+                .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)))
+        };
         let middle = |axis: Vec3| {
             let (a, b) = bounds(axis);
             if a <= b { axis * (0.5 * (a + b)) } else { Vec3::ZERO }
@@ -143,7 +157,12 @@ pub struct Surroundings(EnvironmentMapLight);
 /// Makes it.
 pub fn make_surroundings(mut commands: Commands, mut images: ResMut<Assets<Image>>) {
     let (diffuse, specular) = look::surroundings();
-    let light = EnvironmentMapLight { diffuse_map: images.add(diffuse), specular_map: images.add(specular), intensity: 900.0, ..default() };
+    let light = EnvironmentMapLight {
+        diffuse_map: images.add(diffuse),
+        specular_map: images.add(specular),
+        intensity: 900.0,
+        ..default()
+    };
     commands.insert_resource(Surroundings(light));
 }
 
@@ -154,7 +173,8 @@ pub fn lens(orbit: &Orbit, around: &Surroundings) -> impl Bundle {
         Camera { clear_color: ClearColorConfig::Custom(BACKGROUND), ..default() },
         Projection::from(projection(orbit)),
         orbit.transform(),
-        // Needs no table of the renderer's. It is done before the samples of a pixel are averaged: highlights have smooth edges then.
+        // Needs no table of the renderer's. It is done before the samples of a pixel are averaged: highlights have
+        // smooth edges then.
         Tonemapping::AcesFitted,
         Msaa::Sample4,
         around.0.clone(),
@@ -170,11 +190,18 @@ fn projection(orbit: &Orbit) -> PerspectiveProjection {
 
 /// The table ends in the dark.
 fn fog(orbit: &Orbit) -> DistanceFog {
-    DistanceFog { color: BACKGROUND, falloff: FogFalloff::Linear { start: 0.7 * orbit.far(), end: 2.2 * orbit.far() }, ..default() }
+    DistanceFog {
+        color: BACKGROUND,
+        falloff: FogFalloff::Linear { start: 0.7 * orbit.far(), end: 2.2 * orbit.far() },
+        ..default()
+    }
 }
 
 /// Puts the camera where it is to be.
-pub fn follow(orbit: Res<Orbit>, mut cameras: Query<(&mut Transform, &mut Projection, &mut DistanceFog), With<PointerCamera>>) {
+pub fn follow(
+    orbit: Res<Orbit>,
+    mut cameras: Query<(&mut Transform, &mut Projection, &mut DistanceFog), With<PointerCamera>>,
+) {
     if !orbit.is_changed() {
         return;
     }
@@ -186,8 +213,8 @@ pub fn follow(orbit: Res<Orbit>, mut cameras: Query<(&mut Transform, &mut Projec
     }
 }
 
-/// The mouse moves the camera: right button (or left beside everything) turns, middle one moves, the wheel comes nearer; while something is held, it
-/// brings that nearer.
+/// The mouse moves the camera: right button (or left beside everything) turns, middle one moves, the wheel comes
+/// nearer; while something is held, it brings that nearer.
 pub fn orbit(
     mut orbit: ResMut<Orbit>,
     buttons: Res<ButtonInput<MouseButton>>,

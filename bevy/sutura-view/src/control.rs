@@ -118,7 +118,8 @@ pub fn open(world: &mut World, name: &str) {
     stage::open(world, name);
     if world.resource::<Stage>().generation != before {
         let mut viewer = world.resource_mut::<Viewer>();
-        (viewer.grips, viewer.message, viewer.tension_scale) = ([None; 2], String::new(), Viewer::default().tension_scale);
+        (viewer.grips, viewer.message, viewer.tension_scale) =
+            ([None; 2], String::new(), Viewer::default().tension_scale);
     }
 }
 
@@ -267,13 +268,15 @@ pub fn play_recording(mut stage: ResMut<Stage>, clock: Res<PhysicsClock>, time: 
     stage.past = stage.frame_at(stage.time);
 }
 
-/// A grip of the keyboard takes an end of a thread, or lets go. Where a grip of the scene holds it already, that one is driven.
+/// A grip of the keyboard takes an end of a thread, or lets go. Where a grip of the scene holds it already, that one is
+/// driven.
 fn take(world: &mut World, side: usize) {
     if let Some(grip) = world.resource_mut::<Viewer>().grips[side].take() {
         world.despawn(grip);
         return;
     }
-    let mut threads: Vec<(usize, Entity)> = world.query_filtered::<(Entity, &Prop), With<Thread>>().iter(world).map(|(e, p)| (p.0, e)).collect();
+    let mut threads: Vec<(usize, Entity)> =
+        world.query_filtered::<(Entity, &Prop), With<Thread>>().iter(world).map(|(e, p)| (p.0, e)).collect();
     threads.sort_unstable();
     let chosen = if side == 0 { threads.first() } else { threads.last() };
     let Some((_, thread)) = chosen.copied() else {
@@ -318,21 +321,30 @@ pub fn drive(
         let down = DRIVE[side].map(|k| f64::from(u8::from(keys.pressed(k))));
         let fast = if keys.pressed(KeyCode::ShiftLeft) || keys.pressed(KeyCode::ShiftRight) { 4.0 } else { 1.0 };
         let axis = |v: Vec3| space.direction_back(v);
-        let way = axis(orbit.right()) * (down[1] - down[0]) + axis(orbit.above()) * (down[3] - down[2]) + axis(orbit.forward()) * (down[4] - down[5]);
+        let way = axis(orbit.right()) * (down[1] - down[0])
+            + axis(orbit.above()) * (down[3] - down[2])
+            + axis(orbit.forward()) * (down[4] - down[5]);
         let twist = (down[7] - down[6]) * 3.0 * fast * clock.frame;
         (grip.limits.speed, grip.limits.force) = (hand.speed_limit, hand.force_limit);
         if way == DVec3::ZERO && twist == 0.0 {
             continue;
         }
         let pose = grip.pose();
-        let step = way.normalize_or_zero() * (viewer.grip_speed * fast * clock.frame * f64::from(clock.remaining.max(1)));
+        let step =
+            way.normalize_or_zero() * (viewer.grip_speed * fast * clock.frame * f64::from(clock.remaining.max(1)));
         let about = DQuat::from_axis_angle(pose.orientation * DVec3::Z, twist * f64::from(clock.remaining.max(1)));
         grip.target = Some(Pose::new(pose.position + step, (about * pose.orientation).normalize()));
     }
 }
 
 /// A grip that no key moves any more stays where it is, and one that the scene let go is nobody's.
-pub fn settle(mut commands: Commands, mut viewer: ResMut<Viewer>, sutura: Res<Sutura>, hand: Res<Hand>, mut grips: Query<&mut Grip>) {
+pub fn settle(
+    mut commands: Commands,
+    mut viewer: ResMut<Viewer>,
+    sutura: Res<Sutura>,
+    hand: Res<Hand>,
+    mut grips: Query<&mut Grip>,
+) {
     for side in 0..2 {
         let Some(entity) = viewer.grips[side] else { continue };
         if let Ok(mut grip) = grips.get_mut(entity) {
@@ -365,7 +377,13 @@ fn give_back(world: &mut World) {
             None => None,
         };
         let entities = world.resource::<Viewer>().grips.into_iter().flatten().chain(hand);
-        let part = |e: Entity| world.get::<Grip>(e).and_then(Grip::handle).map(Part::Grip).or(world.get::<Body>(e).and_then(Body::handle).map(Part::Body));
+        let part = |e: Entity| {
+            world
+                .get::<Grip>(e)
+                .and_then(Grip::handle)
+                .map(Part::Grip)
+                .or(world.get::<Body>(e).and_then(Body::handle).map(Part::Body))
+        };
         entities.filter_map(part).collect()
     };
     let mut sutura = world.resource_mut::<Sutura>();
@@ -419,7 +437,10 @@ pub fn record(world: &mut World) {
 
 /// A name that no file has yet.
 fn unique(folder: &std::path::Path) -> String {
-    let taken = |n: u32| ["png", "glb", "sutura"].iter().any(|e| folder.join(format!("{n:03}.{e}")).exists()) || folder.join(format!("{n:03}-frames")).exists();
+    let taken = |n: u32| {
+        ["png", "glb", "sutura"].iter().any(|e| folder.join(format!("{n:03}.{e}")).exists())
+            || folder.join(format!("{n:03}-frames")).exists()
+    };
     format!("{:03}", (1..).find(|n| !taken(*n)).unwrap_or(0))
 }
 
@@ -442,6 +463,8 @@ fn write_glb(stage: &Stage, folder: &std::path::Path) -> Result<String, String> 
 fn write_input(sutura: &Sutura, folder: &std::path::Path) -> Result<String, String> {
     let recording = sutura.recording().ok_or("nothing is recorded")?;
     let path = folder.join(format!("{}.sutura", unique(folder)));
-    std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, recording.to_bytes())).map_err(|e| format!("cannot write {}: {e}", path.display()))?;
+    std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&path, recording.to_bytes()))
+        .map_err(|e| format!("cannot write {}: {e}", path.display()))?;
     Ok(format!("input: {} (sutura replay)", path.display()))
 }

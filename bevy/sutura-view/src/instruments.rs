@@ -46,7 +46,10 @@ impl Holding {
         let mut best: Option<(f64, Holding)> = None;
         for rod in world.view().rods() {
             let x = rod.positions();
-            let Some((i, d)) = x.iter().map(|p| p.distance_squared(at)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)) else { continue };
+            let Some((i, d)) = x.iter().map(|p| p.distance_squared(at)).enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+            else {
+                continue;
+            };
             if best.as_ref().is_some_and(|b| b.0 <= d) {
                 continue;
             }
@@ -59,7 +62,17 @@ impl Holding {
             } else {
                 DVec3::ZERO
             };
-            best = Some((d, Holding { grip, band, at, tangent: (after - before).normalize_or(DVec3::X), outward, bore: 2.0 * rod.radius() }));
+            best = Some((
+                d,
+                Holding {
+                    grip,
+                    band,
+                    at,
+                    tangent: (after - before).normalize_or(DVec3::X),
+                    outward,
+                    bore: 2.0 * rod.radius(),
+                },
+            ));
         }
         best.map(|b| b.1)
     }
@@ -102,9 +115,15 @@ pub fn show(
     let mut wanted: Vec<Holding> = Vec::new();
     if viewer.instruments && stage.past.is_none() {
         let hands = grips.iter().filter_map(Grip::handle).map(|h| (h, HANDS));
-        let scenes = sutura.simulation::<Play>().into_iter().flat_map(|p| p.0.grips().filter_map(|(_, h)| h)).map(|h| (h, SCENES));
+        let scenes = sutura
+            .simulation::<Play>()
+            .into_iter()
+            .flat_map(|p| p.0.grips().filter_map(|(_, h)| h))
+            .map(|h| (h, SCENES));
         for (grip, band) in hands.chain(scenes) {
-            if let Some(holding) = Holding::of(world, grip, band).filter(|h| wanted.iter().all(|w| w.at.distance(h.at) > TOGETHER)) {
+            if let Some(holding) =
+                Holding::of(world, grip, band).filter(|h| wanted.iter().all(|w| w.at.distance(h.at) > TOGETHER))
+            {
                 wanted.push(holding);
             }
         }
@@ -124,7 +143,8 @@ pub fn show(
         match shown.iter_mut().find(|(_, i, _)| i.grip == holding.grip) {
             Some((_, mut instrument, mut transform)) => {
                 // Looked at anew it is where it is to be.
-                let part = if instrument.axes == axes { 1.0 - (-(time - instrument.time).max(0.0) / LAG).exp() } else { 1.0 };
+                let part =
+                    if instrument.axes == axes { 1.0 - (-(time - instrument.time).max(0.0) / LAG).exp() } else { 1.0 };
                 instrument.hand = instrument.hand.lerp(goal, part).normalize_or(goal);
                 (instrument.time, instrument.axes) = (time, axes);
                 *transform = place(instrument.hand);

@@ -94,10 +94,29 @@ pub const KEYS: &[(KeyCode, &str, &str, Action)] = &[
     (KeyCode::Escape, "Esc", "close help and messages, let go", Action::Dismiss),
 ];
 
-/// Keys that move a grip while they are down: left, right, down, up, away, nearer, twist one way and the other, as seen in the picture.
+/// Keys that move a grip while they are down: left, right, down, up, away, nearer, twist one way and the other, as seen
+/// in the picture.
 pub const DRIVE: [[KeyCode; 8]; 2] = [
-    [KeyCode::KeyA, KeyCode::KeyD, KeyCode::KeyS, KeyCode::KeyW, KeyCode::KeyQ, KeyCode::KeyE, KeyCode::KeyZ, KeyCode::KeyX],
-    [KeyCode::KeyJ, KeyCode::KeyL, KeyCode::KeyK, KeyCode::KeyI, KeyCode::KeyU, KeyCode::KeyO, KeyCode::KeyN, KeyCode::KeyM],
+    [
+        KeyCode::KeyA,
+        KeyCode::KeyD,
+        KeyCode::KeyS,
+        KeyCode::KeyW,
+        KeyCode::KeyQ,
+        KeyCode::KeyE,
+        KeyCode::KeyZ,
+        KeyCode::KeyX,
+    ],
+    [
+        KeyCode::KeyJ,
+        KeyCode::KeyL,
+        KeyCode::KeyK,
+        KeyCode::KeyI,
+        KeyCode::KeyU,
+        KeyCode::KeyO,
+        KeyCode::KeyN,
+        KeyCode::KeyM,
+    ],
 ];
 
 /// What else there is to do, in words.

@@ -1,4 +1,5 @@
-//! The viewer of sutura, as a library for its program and its tests: [`window`] shows scenes in a window, [`Studio`] draws them without one.
+//! The viewer of sutura, as a library for its program and its tests: [`window`] shows scenes in a window, [`Studio`]
+//! draws them without one.
 
 pub mod args;
 pub mod camera;
@@ -36,22 +37,38 @@ impl Plugin for ViewerPlugin {
         app.init_resource::<Viewer>().init_resource::<Stage>().init_resource::<Orbit>().init_resource::<Typing>();
         app.init_resource::<panel::Curves>().init_resource::<panel::Knots>().init_resource::<parameters::Parameters>();
         let keys = resource_exists::<ButtonInput<KeyCode>>;
-        app.add_systems(PreUpdate, (control::read_keys, control::read_drops, control::act).chain().after(InputSystems).run_if(keys));
+        app.add_systems(
+            PreUpdate,
+            (control::read_keys, control::read_drops, control::act).chain().after(InputSystems).run_if(keys),
+        );
         app.add_systems(PreUpdate, (parameters::remember, parameters::apply).chain().after(control::act));
         app.add_systems(
             PhysicsFrame,
-            (control::drive.in_set(PhysicsSet::Drive).run_if(keys), (stage::remember, control::settle, panel::measure).chain().after(PhysicsSet::Step)),
+            (
+                control::drive.in_set(PhysicsSet::Drive).run_if(keys),
+                (stage::remember, control::settle, panel::measure).chain().after(PhysicsSet::Step),
+            ),
         );
         app.add_systems(
             Update,
-            (control::play_recording, stage::show_past, control::show_tension, stage::lay_table, panel::recognize_knots, camera::orbit.run_if(keys)).chain(),
+            (
+                control::play_recording,
+                stage::show_past,
+                control::show_tension,
+                stage::lay_table,
+                panel::recognize_knots,
+                camera::orbit.run_if(keys),
+            )
+                .chain(),
         );
         // Where there is a renderer.
         let renders = resource_exists::<Assets<StandardMaterial>>;
         app.add_systems(Startup, (stage::light, camera::make_surroundings).run_if(renders));
         app.add_systems(
             Update,
-            (camera::follow, stage::aim, stage::cover_table.after(stage::lay_table), instruments::show).after(camera::orbit).run_if(renders),
+            (camera::follow, stage::aim, stage::cover_table.after(stage::lay_table), instruments::show)
+                .after(camera::orbit)
+                .run_if(renders),
         );
         let lines = resource_exists::<GizmoConfigStore>;
         app.add_systems(Startup, overlay::set_up.run_if(lines));
@@ -67,7 +84,8 @@ pub fn window(args: &Args) -> AppExit {
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }).set(quiet()));
     app.add_plugins((EguiPlugin::default(), ViewerPlugin));
     app.world_mut().resource_mut::<PhysicsClock>().running = !args.paused;
-    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second, and half of a slower one.
+    // The picture goes on where physics is slow: it gets two thirds of a picture at 30 a second, and half of a slower
+    // one.
     app.world_mut().resource_mut::<PhysicsClock>().budget = std::time::Duration::from_millis(22);
     app.world_mut().resource_mut::<PhysicsClock>().share = std::time::Duration::from_millis(200);
     app.world_mut().resource_mut::<PhysicsClock>().most_frame = Some(std::time::Duration::from_millis(14));
@@ -81,7 +99,8 @@ pub fn window(args: &Args) -> AppExit {
     });
     app.insert_resource(Zoom(zoom));
     app.add_systems(EguiPrimaryContextPass, panel::show);
-    // Letters that were not shown before are in the texture of letters in the picture that shows them; else they are missing there.
+    // Letters that were not shown before are in the texture of letters in the picture that shows them; else they are
+    // missing there.
     app.configure_sets(PostUpdate, EguiPostUpdateSet::PostProcessOutput.before(AssetEventSystems));
     if args.trial {
         trial::build(&mut app);
@@ -91,7 +110,10 @@ pub fn window(args: &Args) -> AppExit {
 
 /// Messages of the engine and the viewer, and warnings of the rest.
 fn quiet() -> LogPlugin {
-    LogPlugin { filter: "warn,sutura_view=info,sutura_bevy=info,wgpu_hal=error,naga=error,bevy_render::renderer=error".into(), ..default() }
+    LogPlugin {
+        filter: "warn,sutura_view=info,sutura_bevy=info,wgpu_hal=error,naga=error,bevy_render::renderer=error".into(),
+        ..default()
+    }
 }
 
 /// How close the first view is.

@@ -41,8 +41,11 @@ pub fn draw(
             for (e, q) in strand.orientations.iter().enumerate() {
                 let middle = (strand.positions[e] + strand.positions[e + 1]) * 0.5;
                 let long = 3.5 * strand.skin.radius;
-                for (axis, color) in [(DVec3::X, Color::srgb(1.0, 0.25, 0.2)), (DVec3::Y, Color::srgb(0.3, 1.0, 0.3)), (DVec3::Z, Color::srgb(0.35, 0.55, 1.0))]
-                {
+                for (axis, color) in [
+                    (DVec3::X, Color::srgb(1.0, 0.25, 0.2)),
+                    (DVec3::Y, Color::srgb(0.3, 1.0, 0.3)),
+                    (DVec3::Z, Color::srgb(0.35, 0.55, 1.0)),
+                ] {
                     gizmos.line(space.place(middle), space.place(middle + *q * axis * long), color);
                 }
             }
@@ -51,7 +54,14 @@ pub fn draw(
     if viewer.primitives {
         for strand in &strands {
             for (e, q) in strand.orientations.iter().enumerate() {
-                capsule(&mut gizmos, &space, strand.positions[e], strand.positions[e + 1], *q * DVec3::X, strand.skin.radius);
+                capsule(
+                    &mut gizmos,
+                    &space,
+                    strand.positions[e],
+                    strand.positions[e + 1],
+                    *q * DVec3::X,
+                    strand.skin.radius,
+                );
             }
         }
         for solid in &solids {
@@ -74,15 +84,18 @@ pub fn draw(
     }
     let holds: Vec<(DVec3, DVec3)> = match past {
         Some(frame) => {
-            let forces = frame.forces.iter().flat_map(|f| &f.grips).map(|f| place(*f)).chain(std::iter::repeat(DVec3::ZERO));
+            let forces =
+                frame.forces.iter().flat_map(|f| &f.grips).map(|f| place(*f)).chain(std::iter::repeat(DVec3::ZERO));
             frame.grips.iter().zip(forces).filter_map(|(at, force)| Some((place((*at)?), force))).collect()
         }
         None => {
             // Grips of the scene, of the keyboard, of the mouse.
             let world = sutura.world();
             let scenes = sutura.simulation::<Play>().into_iter().flat_map(|p| p.0.grips().filter_map(|(_, h)| h));
-            let scenes = scenes.filter_map(|h| Some((world.grip_pose(h).ok()?.position, world.grip_wrench(h).ok()?.force)));
-            let hands = grips.iter().filter_map(|g| Some((world.grip_pose(g.handle()?).ok()?.position, g.wrench().force)));
+            let scenes =
+                scenes.filter_map(|h| Some((world.grip_pose(h).ok()?.position, world.grip_wrench(h).ok()?.force)));
+            let hands =
+                grips.iter().filter_map(|g| Some((world.grip_pose(g.handle()?).ok()?.position, g.wrench().force)));
             let body = matches!(hand.held, Some(sutura_bevy::Held::Body(_))).then_some((hand.at, hand.force));
             scenes.chain(hands).chain(body).collect()
         }
@@ -160,8 +173,16 @@ fn outline(gizmos: &mut Gizmos, space: &Space, geometry: &Geometry, pose: Pose, 
             let half = 100.0 * size;
             for k in -4..=4 {
                 let s = half * f64::from(k) / 4.0;
-                gizmos.line(space.place(pose.position + x * s - y * half), space.place(pose.position + x * s + y * half), PRIMITIVE);
-                gizmos.line(space.place(pose.position + y * s - x * half), space.place(pose.position + y * s + x * half), PRIMITIVE);
+                gizmos.line(
+                    space.place(pose.position + x * s - y * half),
+                    space.place(pose.position + x * s + y * half),
+                    PRIMITIVE,
+                );
+                gizmos.line(
+                    space.place(pose.position + y * s - x * half),
+                    space.place(pose.position + y * s + x * half),
+                    PRIMITIVE,
+                );
             }
         }
         Geometry::Sphere { radius } => {
@@ -182,7 +203,12 @@ fn outline(gizmos: &mut Gizmos, space: &Space, geometry: &Geometry, pose: Pose, 
         Geometry::Box { half_sides } => {
             let corner = |i: usize| {
                 let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-                space.place(pose.position + x * (sign(0) * half_sides.x) + y * (sign(1) * half_sides.y) + z * (sign(2) * half_sides.z))
+                space.place(
+                    pose.position
+                        + x * (sign(0) * half_sides.x)
+                        + y * (sign(1) * half_sides.y)
+                        + z * (sign(2) * half_sides.z),
+                )
             };
             for i in 0..8 {
                 for bit in (0..3).filter(|b| i >> b & 1 == 0) {

@@ -27,7 +27,13 @@ pub struct Curves {
 const POINTS: usize = 600;
 
 /// Takes down what the curves show.
-pub fn measure(mut curves: ResMut<Curves>, clock: Res<PhysicsClock>, sutura: Res<Sutura>, hand: Res<Hand>, grips: Query<&Grip>) {
+pub fn measure(
+    mut curves: ResMut<Curves>,
+    clock: Res<PhysicsClock>,
+    sutura: Res<Sutura>,
+    hand: Res<Hand>,
+    grips: Query<&Grip>,
+) {
     if clock.frames == curves.frames {
         return;
     }
@@ -77,7 +83,10 @@ pub fn recognize_knots(
             let name = match live {
                 Some(play) => play.0.knot(prop.0).knot,
                 None if strand.positions.len() < 3 => return (prop.0, String::new()),
-                None => recognize(&strand.positions, if strand.skin.seam.is_some() { Ends::Closed } else { Ends::Free }, 1).to_string(),
+                None => {
+                    recognize(&strand.positions, if strand.skin.seam.is_some() { Ends::Closed } else { Ends::Free }, 1)
+                        .to_string()
+                }
             };
             (prop.0, name)
         })
@@ -95,7 +104,8 @@ pub fn show(world: &mut World) {
     labels(world, &context);
     let viewer = world.resource::<Viewer>().clone();
     if viewer.panels {
-        // A window of another size has its corners elsewhere: panels that stayed, or were pushed together in a small one, would lie on each other.
+        // A window of another size has its corners elsewhere: panels that stayed, or were pushed together in a small
+        // one, would lie on each other.
         let (key, size) = (egui::Id::new("size of the window"), context.content_rect().size());
         let resized = context.data_mut(|d| d.get_temp::<egui::Vec2>(key).is_some_and(|before| before != size));
         context.data_mut(|d| d.insert_temp(key, size));
@@ -116,8 +126,8 @@ pub fn show(world: &mut World) {
     world.resource_mut::<Typing>().0 = typing(&context);
 }
 
-/// Whether the keyboard belongs to a field in which something is typed. What else was clicked, or reached by Tab, would keep the keys from the viewer, and take
-/// Space for a click: it lets go of them.
+/// Whether the keyboard belongs to a field in which something is typed. What else was clicked, or reached by Tab, would
+/// keep the keys from the viewer, and take Space for a click: it lets go of them.
 fn typing(context: &egui::Context) -> bool {
     let typing = context.text_edit_focused();
     if !typing {
@@ -157,8 +167,10 @@ fn scene_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'
         let mut time = stage.shown().map_or(last, |f| f.time);
         let old = time;
         ui.spacing_mut().slider_width = 150.0;
-        // Decimals by the formatter alone: a slider that is given a number of decimals rounds the time itself, which would count as a wish to go there.
-        let slider = egui::Slider::new(&mut time, first..=last.max(first + 1e-9)).custom_formatter(|t, _| format!("{t:.2} s"));
+        // Decimals by the formatter alone: a slider that is given a number of decimals rounds the time itself, which
+        // would count as a wish to go there.
+        let slider =
+            egui::Slider::new(&mut time, first..=last.max(first + 1e-9)).custom_formatter(|t, _| format!("{t:.2} s"));
         ui.add_enabled(last > first, slider);
         if time != old {
             go_to(world, time);
@@ -167,18 +179,28 @@ fn scene_panel(world: &mut World, context: &egui::Context, panel: egui::Window<'
         ui.add(egui::Slider::new(&mut clock.speed, 1.0 / 64.0..=16.0).logarithmic(true).text("speed"));
         let line = format!("{:.1} ms a frame, {:.2} x real time", clock.ms, clock.rate);
         if clock.is_late() {
-            ui.colored_label(Color32::from_rgb(255, 150, 60), format!("{line}\nphysics cannot keep up: {:.1} s given up", clock.lost));
+            ui.colored_label(
+                Color32::from_rgb(255, 150, 60),
+                format!("{line}\nphysics cannot keep up: {:.1} s given up", clock.lost),
+            );
         } else {
             ui.label(line);
         }
         if let Some(play) = world.resource::<Sutura>().simulation::<Play>() {
             let now = play.0.now();
-            ui.label(if now.finished { "the scene is over, the world goes on".into() } else { format!("phase {}", now.phase) });
+            ui.label(if now.finished {
+                "the scene is over, the world goes on".into()
+            } else {
+                format!("phase {}", now.phase)
+            });
             for warning in play.0.warnings() {
                 ui.colored_label(Color32::from_rgb(255, 190, 80), &warning.message);
             }
             for incident in play.0.incidents() {
-                ui.colored_label(Color32::from_rgb(255, 120, 90), format!("{} ({} times)", incident.message, incident.count));
+                ui.colored_label(
+                    Color32::from_rgb(255, 120, 90),
+                    format!("{} ({} times)", incident.message, incident.count),
+                );
             }
         }
         ui.separator();
@@ -227,7 +249,11 @@ fn parameter_panel(world: &mut World, context: &egui::Context, panel: egui::Wind
             });
             ui.add(egui::Slider::new(&mut hand.speed_limit, 0.01..=2.0).logarithmic(true).text("speed limit [m/s]"));
             ui.add(egui::Slider::new(&mut hand.force_limit, 0.01..=20.0).logarithmic(true).text("force limit [N]"));
-            ui.add(egui::Slider::new(&mut world.resource_mut::<Viewer>().grip_speed, 0.001..=0.2).logarithmic(true).text("keys [m/s]"));
+            ui.add(
+                egui::Slider::new(&mut world.resource_mut::<Viewer>().grip_speed, 0.001..=0.2)
+                    .logarithmic(true)
+                    .text("keys [m/s]"),
+            );
         });
     });
 }
@@ -250,7 +276,10 @@ fn curve(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f64>, mark: Opti
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, Color32::from_black_alpha(120));
     let at = |i: usize, v: f64| {
-        egui::pos2(rect.left() + rect.width() * i as f32 / POINTS as f32, rect.bottom() - 2.0 - (rect.height() - 4.0) * (v / most).clamp(0.0, 1.0) as f32)
+        egui::pos2(
+            rect.left() + rect.width() * i as f32 / POINTS as f32,
+            rect.bottom() - 2.0 - (rect.height() - 4.0) * (v / most).clamp(0.0, 1.0) as f32,
+        )
     };
     if let Some(mark) = mark {
         painter.line_segment([at(0, mark), at(POINTS, mark)], (1.0, Color32::from_gray(110)));
@@ -261,26 +290,32 @@ fn curve(ui: &mut Ui, name: &str, unit: &str, values: &VecDeque<f64>, mark: Opti
 
 fn help(world: &mut World, context: &egui::Context) {
     let mut open = true;
-    egui::Window::new("Keys").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).resizable(false).show(context, |ui| {
-        egui::ScrollArea::vertical().max_height(0.8 * context.content_rect().height()).show(ui, |ui| {
-            egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
-                for (key, what) in OTHERS.iter().copied().chain(KEYS.iter().map(|k| (k.1, k.2))) {
-                    ui.label(RichText::new(key).strong());
-                    ui.label(what);
-                    ui.end_row();
-                }
+    egui::Window::new("Keys").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).resizable(false).show(
+        context,
+        |ui| {
+            egui::ScrollArea::vertical().max_height(0.8 * context.content_rect().height()).show(ui, |ui| {
+                egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+                    for (key, what) in OTHERS.iter().copied().chain(KEYS.iter().map(|k| (k.1, k.2))) {
+                        ui.label(RichText::new(key).strong());
+                        ui.label(what);
+                        ui.end_row();
+                    }
+                });
             });
-        });
-    });
+        },
+    );
     world.resource_mut::<Viewer>().help = open;
 }
 
 fn error_window(world: &mut World, context: &egui::Context) {
     let Some(error) = world.resource::<Stage>().error.clone() else { return };
     let mut open = true;
-    egui::Window::new("This cannot be opened").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(context, |ui| {
-        ui.label(RichText::new(error).monospace().color(Color32::from_rgb(255, 150, 120)));
-    });
+    egui::Window::new("This cannot be opened").open(&mut open).anchor(egui::Align2::CENTER_CENTER, [0.0, 0.0]).show(
+        context,
+        |ui| {
+            ui.label(RichText::new(error).monospace().color(Color32::from_rgb(255, 150, 120)));
+        },
+    );
     if !open {
         world.resource_mut::<Stage>().error = None;
     }
@@ -308,7 +343,9 @@ fn labels(world: &mut World, context: &egui::Context) {
         marks.push((space.place(hand.at), hand.force.length()));
     }
     let mut grips = world.query::<&Grip>();
-    marks.extend(grips.iter(world).filter(|g| g.handle().is_some()).map(|g| (space.place(g.pose().position), g.force())));
+    marks.extend(
+        grips.iter(world).filter(|g| g.handle().is_some()).map(|g| (space.place(g.pose().position), g.force())),
+    );
     let mut cameras = world.query_filtered::<(&Camera, &GlobalTransform), With<PointerCamera>>();
     let Ok((camera, place)) = cameras.single(world) else { return };
     for (at, force) in marks {
@@ -336,7 +373,11 @@ mod tests {
         let mut picture = |events: Vec<Event>| {
             let (mut button, mut field) = (egui::Rect::NOTHING, egui::Rect::NOTHING);
             let mut clicks = 0;
-            let input = RawInput { screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(300.0, 200.0))), events, ..RawInput::default() };
+            let input = RawInput {
+                screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(300.0, 200.0))),
+                events,
+                ..RawInput::default()
+            };
             context
                 .run_ui(input, |ui| {
                     let response = ui.button("button");
@@ -348,8 +389,16 @@ mod tests {
                 .clear();
             (button.center(), field.center(), clicks, typing(&context))
         };
-        let at = |pos| move |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::default() };
-        let key = |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::default() };
+        let at = |pos| {
+            move |pressed| Event::PointerButton {
+                pos,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::default(),
+            }
+        };
+        let key =
+            |key| Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers: Modifiers::default() };
         let (button, field, ..) = picture(vec![]);
         // A button is clicked; Space after that is no click.
         picture(vec![Event::PointerMoved(button)]);

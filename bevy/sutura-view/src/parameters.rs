@@ -1,4 +1,5 @@
-//! What can be changed while a scene runs: settings and solver, friction, what threads are made of. What the scene had at its beginning is remembered.
+//! What can be changed while a scene runs: settings and solver, friction, what threads are made of. What the scene had
+//! at its beginning is remembered.
 
 use crate::source::Play;
 use crate::stage::Stage;
@@ -7,7 +8,8 @@ use bevy_egui::egui::{self, Color32, RichText, Slider, SliderClamping, Ui, emath
 use std::ops::RangeInclusive;
 use sutura_bevy::Sutura;
 use sutura_bevy::sutura::{
-    self, Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Shear, Solver, Stretch, SweepOrder, World as Engine,
+    self, Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Shear, Solver, Stretch,
+    SweepOrder, World as Engine,
 };
 
 /// One change of the world.
@@ -30,7 +32,8 @@ pub struct Parameters {
     pub wanted: Vec<Change>,
     /// What the engine refused last, and why; until it takes something.
     pub error: Option<String>,
-    /// Everything as the scene had it at its beginning, in the order in which it is put back. A solver that knows less comes after what it does not know.
+    /// Everything as the scene had it at its beginning, in the order in which it is put back. A solver that knows less
+    /// comes after what it does not know.
     had: Vec<Change>,
     /// The opening of a scene of which that is.
     generation: u64,
@@ -141,8 +144,10 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
             }
         }
     });
-    let threads: Vec<(String, Handle<Rod>)> =
-        sutura.simulation::<Play>().map(|p| p.0.threads().map(|(name, rod)| (name.to_owned(), rod)).collect()).unwrap_or_default();
+    let threads: Vec<(String, Handle<Rod>)> = sutura
+        .simulation::<Play>()
+        .map(|p| p.0.threads().map(|(name, rod)| (name.to_owned(), rod)).collect())
+        .unwrap_or_default();
     for (name, rod) in &threads {
         let Ok(r) = engine.rod(*rod) else { continue };
         egui::CollapsingHeader::new(format!("Material of {name}")).default_open(threads.len() == 1).show(ui, |ui| {
@@ -165,7 +170,8 @@ pub(crate) fn show(ui: &mut Ui, world: &mut World) {
 
 /// A number with its unit, with a prefix where the unit takes one: four digits of it.
 fn readable(value: f64, unit: &str, prefixed: bool) -> String {
-    const PREFIXES: [(f64, &str); 7] = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")];
+    const PREFIXES: [(f64, &str); 7] =
+        [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")];
     let (scale, prefix) = match PREFIXES.iter().find(|(scale, _)| value.abs() >= 0.9999 * scale) {
         Some(found) if prefixed => *found,
         _ => (1.0, ""),
@@ -185,7 +191,10 @@ fn slider<'a, N: Numeric>(value: &'a mut N, range: RangeInclusive<N>) -> Slider<
 /// The same over decades, with a unit, which may be typed too.
 fn decades<'a>(value: &'a mut f64, range: RangeInclusive<f64>, unit: &'static str, prefixed: bool) -> Slider<'a> {
     let parse = move |text: &str| sutura_scene::in_si(text.trim(), unit).ok().or_else(|| text.trim().parse().ok());
-    slider(value, range).logarithmic(true).custom_formatter(move |v, _| readable(v, unit, prefixed)).custom_parser(parse)
+    slider(value, range)
+        .logarithmic(true)
+        .custom_formatter(move |v, _| readable(v, unit, prefixed))
+        .custom_parser(parse)
 }
 
 fn settings_ui(ui: &mut Ui, s: &mut Settings, paper: &mut PaperSettings) {
@@ -304,13 +313,22 @@ mod tests {
     /// One picture of a panel of 300 by 1200 points, as the pointer does something.
     fn picture(context: &Context, events: Vec<Event>, mut contents: impl FnMut(&mut Ui)) {
         let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, vec2(300.0, 1200.0)));
-        context.run_ui(RawInput { screen_rect, events, ..RawInput::default() }, |ui| contents(ui)).textures_delta.clear();
+        context
+            .run_ui(RawInput { screen_rect, events, ..RawInput::default() }, |ui| contents(ui))
+            .textures_delta
+            .clear();
     }
 
     /// A click at a place: the pointer comes, presses and lets go.
     fn click(context: &Context, at: Pos2, mut contents: impl FnMut(&mut Ui)) {
-        let button = |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers: Modifiers::default() };
-        for events in [vec![Event::PointerMoved(at)], vec![button(true)], vec![button(false)], vec![Event::PointerGone]] {
+        let button = |pressed| Event::PointerButton {
+            pos: at,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::default(),
+        };
+        for events in [vec![Event::PointerMoved(at)], vec![button(true)], vec![button(false)], vec![Event::PointerGone]]
+        {
             picture(context, events, &mut contents);
         }
     }
@@ -351,11 +369,23 @@ mod tests {
     #[test]
     fn looking_at_a_panel_changes_nothing() {
         let set = Plasticity { yield_curvature: 0.123_456_789, yield_twist: 1e7, hardening: 0.999 };
-        let mut material = Material { bend_scale: 1.0 / 3.0, bend_damping: 77.7, plasticity: Some(set), ..Material::elastic(12.345_678_9, 1e5) };
+        let mut material = Material {
+            bend_scale: 1.0 / 3.0,
+            bend_damping: 77.7,
+            plasticity: Some(set),
+            ..Material::elastic(12.345_678_9, 1e5)
+        };
         let numbers = PaperSettings { iterations: 5000, frame_inertia: 1e-4, ..PaperSettings::default() };
-        let wild = Settings { newton_max: 300, substep: 1.0 / 7e6, linear_damping: 0.999_999, tolerance: 1e-9, ..Settings::default() };
+        let wild = Settings {
+            newton_max: 300,
+            substep: 1.0 / 7e6,
+            linear_damping: 0.999_999,
+            tolerance: 1e-9,
+            ..Settings::default()
+        };
         let context = Context::default();
-        for (shear, solver) in [(Shear::Poisson(-0.97), Solver::Direct), (Shear::Modulus(1.0), Solver::Paper(numbers))] {
+        for (shear, solver) in [(Shear::Poisson(-0.97), Solver::Direct), (Shear::Modulus(1.0), Solver::Paper(numbers))]
+        {
             material.shear = shear;
             let settings = Settings { solver, ..wild.clone() };
             let friction = Friction { stick: 7.0, slide: 6.0 };
@@ -378,7 +408,11 @@ mod tests {
                 app.update();
             }
             let parameters = app.world().resource::<Parameters>();
-            assert!(parameters.wanted.is_empty() && parameters.changed(app.world().resource::<Sutura>().world()).is_empty(), "{}", sample.name);
+            assert!(
+                parameters.wanted.is_empty() && parameters.changed(app.world().resource::<Sutura>().world()).is_empty(),
+                "{}",
+                sample.name
+            );
             assert!(before.is_some() && done(&app) == before, "{}", sample.name);
         }
     }
@@ -390,14 +424,16 @@ mod tests {
         let rod = app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.threads().next().unwrap().1;
         let modulus = |app: &App| app.world().resource::<Sutura>().world().rod(rod).unwrap().material().young_modulus;
         let before = modulus(&app);
-        // Up the middle of the sliders, until one of them is that of the modulus; above it headings would fold what is below.
+        // Up the middle of the sliders, until one of them is that of the modulus; above it headings would fold what is
+        // below.
         let place = |app: &mut App, is: &dyn Fn(&[Change]) -> bool, x: f32| {
             (2..300).rev().map(|k| Pos2::new(x, 4.0 * k as f32)).find(|at| {
                 click(&context, *at, |ui| show(ui, app.world_mut()));
                 is(&std::mem::take(&mut app.world_mut().resource_mut::<Parameters>().wanted))
             })
         };
-        let of_modulus = |c: &[Change]| matches!(c, [.., Change::Material(r, m)] if *r == rod && m.young_modulus != before);
+        let of_modulus =
+            |c: &[Change]| matches!(c, [.., Change::Material(r, m)] if *r == rod && m.young_modulus != before);
         let at = place(&mut app, &of_modulus, 60.0).expect("there is a slider of the modulus");
         click(&context, at, |ui| show(ui, app.world_mut()));
         app.update();

@@ -19,7 +19,8 @@ impl Play {
             Part::Body(body) => self.0.shapes().position(|s| s.1 == body).map(Mover::Shape),
         }
     }
-    /// Everything that was taken over goes back to where the scene has it, no faster than this \[m/s\], but what is held still; how many things do.
+    /// Everything that was taken over goes back to where the scene has it, no faster than this \[m/s\], but what is
+    /// held still; how many things do.
     pub fn give_back(&mut self, held: &[Part], speed: f64) -> usize {
         let held: Vec<Mover> = held.iter().filter_map(|p| self.mover(*p)).collect();
         let lent: Vec<Mover> = self.0.lent().filter(|m| !held.contains(m)).collect();
@@ -66,7 +67,10 @@ impl Simulation for Play {
             let middles = [particle.wrapping_sub(1), particle].map(|i| Some((at(i)? + at(i + 1)?) * 0.5));
             Some(middles.into_iter().flatten().chain(at(particle)).any(|q| p.distance(q) < 1e-3 * length))
         };
-        self.0.grips().filter_map(|(_, h)| h).find(|h| world.grip_pose(*h).ok().and_then(|pose| near(pose.position)) == Some(true))
+        self.0
+            .grips()
+            .filter_map(|(_, h)| h)
+            .find(|h| world.grip_pose(*h).ok().and_then(|pose| near(pose.position)) == Some(true))
     }
 }
 
@@ -86,16 +90,23 @@ impl Source {
             let mut start = [0; 8];
             let file = std::fs::File::open(path).and_then(|mut f| std::io::Read::read(&mut f, &mut start));
             return match file {
-                Ok(8) if &start == b"SUTURATR" => Trajectory::read_from(path).map(|t| Source::Recorded(Box::new(t))).map_err(|e| format!("{name}: {e}")),
+                Ok(8) if &start == b"SUTURATR" => Trajectory::read_from(path)
+                    .map(|t| Source::Recorded(Box::new(t)))
+                    .map_err(|e| format!("{name}: {e}")),
                 Ok(_) => Scene::load(path).map(|s| Source::Scene(Box::new(s))).map_err(|e| e.to_string()),
                 Err(e) => Err(format!("{name}: {e}")),
             };
         }
         match samples().iter().find(|s| s.name == name) {
-            Some(sample) => Scene::parse(sample.text, &format!("{name}.toml")).map(|s| Source::Scene(Box::new(s))).map_err(|e| e.to_string()),
+            Some(sample) => Scene::parse(sample.text, &format!("{name}.toml"))
+                .map(|s| Source::Scene(Box::new(s)))
+                .map_err(|e| e.to_string()),
             None => {
                 let names: Vec<&str> = samples().iter().map(|s| s.name).collect();
-                Err(format!("{name}: there is no such file, and no sample scene of that name. There are: {}", names.join(", ")))
+                Err(format!(
+                    "{name}: there is no such file, and no sample scene of that name. There are: {}",
+                    names.join(", ")
+                ))
             }
         }
     }
@@ -107,10 +118,16 @@ pub fn skin(thread: &Thread, positions: &[[f32; 3]]) -> SkinSpec {
     // Recordings of earlier versions have no rest lengths; a thread whose ends meet is taken for a closed one.
     let lengths = || positions.windows(2).map(|w| place(w[0]).distance(place(w[1])).max(1e-9)).collect();
     match &thread.look {
-        Some(look) => {
-            SkinSpec { section: look.section.into(), size: Profile(look.size.clone()), seam: look.seam, ..SkinSpec::new(look.lengths.clone(), thread.radius) }
-        }
-        None => SkinSpec { seam: (positions.len() > 3 && positions.first() == positions.last()).then_some(0.0), ..SkinSpec::new(lengths(), thread.radius) },
+        Some(look) => SkinSpec {
+            section: look.section.into(),
+            size: Profile(look.size.clone()),
+            seam: look.seam,
+            ..SkinSpec::new(look.lengths.clone(), thread.radius)
+        },
+        None => SkinSpec {
+            seam: (positions.len() > 3 && positions.first() == positions.last()).then_some(0.0),
+            ..SkinSpec::new(lengths(), thread.radius)
+        },
     }
 }
 

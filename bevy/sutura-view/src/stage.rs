@@ -81,7 +81,10 @@ impl Stage {
     pub fn frame_at(&self, time: f64) -> Option<usize> {
         let after = self.frames.partition_point(|f| f.time < time);
         let nearer = |i: &usize| (self.frames[*i].time - time).abs();
-        [after.saturating_sub(1), after].into_iter().filter(|i| *i < self.frames.len()).min_by(|a, b| nearer(a).total_cmp(&nearer(b)))
+        [after.saturating_sub(1), after]
+            .into_iter()
+            .filter(|i| *i < self.frames.len())
+            .min_by(|a, b| nearer(a).total_cmp(&nearer(b)))
     }
     /// Adds the present to what is remembered.
     pub fn remember(&mut self, frame: Frame) {
@@ -100,7 +103,8 @@ impl Stage {
     }
 }
 
-/// Opens something in place of what is on view. Where it cannot be opened the error is shown and what was on view stays.
+/// Opens something in place of what is on view. Where it cannot be opened the error is shown and what was on view
+/// stays.
 pub fn open(world: &mut World, name: &str) {
     let opened = Source::open(name).and_then(|source| match source {
         Source::Scene(scene) => Runner::recording(*scene).map(|r| Err(Box::new(r))).map_err(|e| e.to_string()),
@@ -122,7 +126,8 @@ pub fn open(world: &mut World, name: &str) {
 
 /// Takes everything of the scene away.
 fn clear(world: &mut World, name: &str) {
-    let old: Vec<Entity> = world.query_filtered::<Entity, Or<(With<Prop>, With<Table>, With<sutura_bevy::Grip>)>>().iter(world).collect();
+    let old: Vec<Entity> =
+        world.query_filtered::<Entity, Or<(With<Prop>, With<Table>, With<sutura_bevy::Grip>)>>().iter(world).collect();
     for entity in old {
         world.despawn(entity);
     }
@@ -145,7 +150,9 @@ pub fn play(world: &mut World, runner: Runner) {
     stage.frames = vec![runner.frame()];
     stage.camera = scene.camera().copied();
     stage.up = upward(gravity, stage.camera.as_ref());
-    for (i, (name, handle)) in runner.threads().enumerate().map(|(i, (n, h))| (i, (n.to_owned(), h))).collect::<Vec<_>>() {
+    for (i, (name, handle)) in
+        runner.threads().enumerate().map(|(i, (n, h))| (i, (n.to_owned(), h))).collect::<Vec<_>>()
+    {
         let Ok(rod) = runner.world().rod(handle) else { continue };
         // What bends much more easily than it stretches is a braid.
         let look = ThreadLook { braided: rod.material().bend_scale < 0.5, ..ThreadLook::of(i) };
@@ -187,7 +194,8 @@ fn replay(world: &mut World, trajectory: Trajectory) {
     (stage.header, stage.frames, stage.recorded, stage.past) = (header, frames, true, Some(0));
 }
 
-/// Up from the table is against gravity. Without gravity, or where the scene is looked at from below, the cloth lies behind what is looked at instead.
+/// Up from the table is against gravity. Without gravity, or where the scene is looked at from below, the cloth lies
+/// behind what is looked at instead.
 fn upward(gravity: DVec3, camera: Option<&Camera>) -> DVec3 {
     let below = |up: &DVec3| camera.is_some_and(|c| c.from.dot(*up) < -0.1);
     let behind = camera.map(|c| (c.from * 0.8 + c.up * 0.6).normalize_or(DVec3::Z));
@@ -200,7 +208,11 @@ const LEAST_RISE: f64 = 0.45;
 /// A direction to the eye, raised to where it sees the table.
 fn raised(from: DVec3, up: DVec3) -> DVec3 {
     let level = from - up * from.dot(up);
-    if from.dot(up) >= LEAST_RISE || level.length() < 1e-6 { from } else { level.normalize() * (1.0 - LEAST_RISE * LEAST_RISE).sqrt() + up * LEAST_RISE }
+    if from.dot(up) >= LEAST_RISE || level.length() < 1e-6 {
+        from
+    } else {
+        level.normalize() * (1.0 - LEAST_RISE * LEAST_RISE).sqrt() + up * LEAST_RISE
+    }
 }
 
 /// A recorded place or vector.
@@ -254,7 +266,8 @@ pub fn points(world: &mut World) -> Vec<DVec3> {
     out
 }
 
-/// Threads that would be thinner than the least width are drawn that wide, in steps of a quarter so that they are not made anew all the time.
+/// Threads that would be thinner than the least width are drawn that wide, in steps of a quarter so that they are not
+/// made anew all the time.
 pub fn thicken(world: &mut World, pixels: u32) {
     let (orbit, least) = (world.resource::<Orbit>().clone(), world.resource::<crate::control::Viewer>().least_width);
     let space = *world.resource::<Space>();
@@ -282,7 +295,8 @@ pub fn frame_view(world: &mut World, aspect: f32, zoom: f32) -> Orbit {
     Orbit::fitted(&points, space.direction(from), screen_up, at, width, aspect, zoom)
 }
 
-/// Distance from the lowest thing to the table \[m\], and how much more for the height of things: near enough for shadows that ground them.
+/// Distance from the lowest thing to the table \[m\], and how much more for the height of things: near enough for
+/// shadows that ground them.
 const CLEARANCE: (f64, f64) = (0.003, 0.10);
 
 /// The table comes down to where nothing hangs through it. It lies square to the picture.
@@ -346,11 +360,16 @@ pub fn cover_table(
 ) {
     for (entity, table) in &tables {
         let cloth = Cloth { reach: table.reach, folds: 1.0, ..Cloth::default() };
-        commands.entity(entity).insert((Mesh3d(meshes.add(cloth.mesh(space.scale))), MeshMaterial3d(shared.drape.clone()), NotShadowCaster));
+        commands.entity(entity).insert((
+            Mesh3d(meshes.add(cloth.mesh(space.scale))),
+            MeshMaterial3d(shared.drape.clone()),
+            NotShadowCaster,
+        ));
     }
 }
 
-/// The lamp that casts shadows, and the one behind that draws edges; they stand by the camera's scene and not by the camera.
+/// The lamp that casts shadows, and the one behind that draws edges; they stand by the camera's scene and not by the
+/// camera.
 #[derive(Component, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lamp {
     /// From over the left shoulder.
@@ -373,10 +392,12 @@ pub fn light(mut commands: Commands) {
         ..default()
     };
     commands.spawn((key, Lamp::Key));
-    commands.spawn((DirectionalLight { illuminance: 3000.0, color: Color::srgb(0.80, 0.90, 1.0), ..default() }, Lamp::Rim));
+    commands
+        .spawn((DirectionalLight { illuminance: 3000.0, color: Color::srgb(0.80, 0.90, 1.0), ..default() }, Lamp::Rim));
 }
 
-/// The lamps and the room stand by the scene as it is looked at first, and the shadows are as fine as the view is close.
+/// The lamps and the room stand by the scene as it is looked at first, and the shadows are as fine as the view is
+/// close.
 pub fn aim(
     mut commands: Commands,
     stage: Res<Stage>,
@@ -400,13 +421,19 @@ pub fn aim(
             Lamp::Key => up * 0.95 - right * 0.75 + front * 0.25,
             Lamp::Rim => up * 0.55 + right * 0.6 - front * 0.9,
         };
-        *place = Transform::from_translation(orbit.target + toward.normalize() * orbit.distance).looking_at(orbit.target, right);
+        *place = Transform::from_translation(orbit.target + toward.normalize() * orbit.distance)
+            .looking_at(orbit.target, right);
         if *kind == Lamp::Key {
             // Fine shadows where one looks, and coarser ones behind where that is close.
             let (near, middle, far) = (0.3 * orbit.distance, 2.2 * orbit.distance, orbit.far());
             let num_cascades = if far > 1.2 * middle { 2 } else { 1 };
-            let cascades =
-                CascadeShadowConfigBuilder { num_cascades, minimum_distance: near, first_cascade_far_bound: middle, maximum_distance: far, ..default() };
+            let cascades = CascadeShadowConfigBuilder {
+                num_cascades,
+                minimum_distance: near,
+                first_cascade_far_bound: middle,
+                maximum_distance: far,
+                ..default()
+            };
             let cascades = cascades.build();
             commands.entity(lamp).insert(cascades);
         }

@@ -55,7 +55,8 @@ impl Picture {
             for x in 0..width as usize {
                 for c in 0..3 {
                     let f = factor as usize;
-                    let sum: u32 = (0..f * f).map(|k| u32::from(data[(y * f + k / f) * row + 4 * (x * f + k % f) + c])).sum();
+                    let sum: u32 =
+                        (0..f * f).map(|k| u32::from(data[(y * f + k / f) * row + 4 * (x * f + k % f) + c])).sum();
                     out.push((sum / (factor * factor)) as u8);
                 }
             }
@@ -86,14 +87,23 @@ impl Studio {
             DefaultPlugins
                 .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
                 // Nothing is drawn before everything is there.
-                .set(RenderPlugin { synchronous_pipeline_compilation: true, render_creation: settings.into(), ..default() })
+                .set(RenderPlugin {
+                    synchronous_pipeline_compilation: true,
+                    render_creation: settings.into(),
+                    ..default()
+                })
                 .set(quiet())
                 .disable::<WinitPlugin>()
                 .disable::<PipelinedRenderingPlugin>(),
         );
         app.add_plugins(ViewerPlugin);
         let extent = Extent3d { width: size.0 * FINER, height: size.1 * FINER, depth_or_array_layers: 1 };
-        let mut image = Image::new_uninit(extent, TextureDimension::D2, TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::RENDER_WORLD);
+        let mut image = Image::new_uninit(
+            extent,
+            TextureDimension::D2,
+            TextureFormat::Rgba8UnormSrgb,
+            RenderAssetUsages::RENDER_WORLD,
+        );
         image.texture_descriptor.usage |= TextureUsages::RENDER_ATTACHMENT;
         let target = app.world_mut().resource_mut::<Assets<Image>>().add(image);
         let to = target.clone();
@@ -163,11 +173,13 @@ impl Studio {
         self.app.update();
         let taken: Arc<Mutex<Option<Vec<u8>>>> = Arc::default();
         let slot = taken.clone();
-        self.app.world_mut().spawn(Screenshot::image(self.target.clone())).observe(move |captured: On<ScreenshotCaptured>| {
-            if let Ok(mut slot) = slot.lock() {
-                *slot = captured.image.data.clone();
-            }
-        });
+        self.app.world_mut().spawn(Screenshot::image(self.target.clone())).observe(
+            move |captured: On<ScreenshotCaptured>| {
+                if let Ok(mut slot) = slot.lock() {
+                    *slot = captured.image.data.clone();
+                }
+            },
+        );
         for _ in 0..PATIENCE {
             self.app.update();
             // It is on its way: no more are drawn meanwhile.
@@ -187,21 +199,27 @@ impl Studio {
         world.query::<&mut Camera>().iter_mut(world).for_each(|mut c| c.is_active = draws);
     }
 
-    /// The particles of each thread as pixels of the picture, and whether a body or an instrument hides them; those farther outside of the picture than a
-    /// tenth of its height are left out.
+    /// The particles of each thread as pixels of the picture, and whether a body or an instrument hides them; those
+    /// farther outside of the picture than a tenth of its height are left out.
     pub fn threads(&mut self) -> Vec<Vec<(f32, f32, bool)>> {
         let world = self.app.world_mut();
         let (orbit, space) = (world.resource::<Orbit>().clone(), *world.resource::<Space>());
         let eye = space.place_back(orbit.transform().translation);
-        let bodies: Vec<(Triangles, Pose)> =
-            world.query::<&Solid>().iter(world).filter(|s| !matches!(s.geometry, Geometry::Plane)).map(|s| (Triangles::of(&s.geometry, 0.0), s.pose)).collect();
+        let bodies: Vec<(Triangles, Pose)> = world
+            .query::<&Solid>()
+            .iter(world)
+            .filter(|s| !matches!(s.geometry, Geometry::Plane))
+            .map(|s| (Triangles::of(&s.geometry, 0.0), s.pose))
+            .collect();
         let (w, h) = (self.size.0 as f32, self.size.1 as f32);
         let view = orbit.transform().to_matrix().inverse();
         let clip = Mat4::perspective_infinite_reverse_rh(FIELD, w / h, 0.1) * view;
         let tips: Vec<(Triangles, Pose)> = world
             .query::<(&Tip, &Transform)>()
             .iter(world)
-            .map(|(tip, at)| (tip.triangles(), Pose::new(space.place_back(at.translation), space.turn_back(at.rotation))))
+            .map(|(tip, at)| {
+                (tip.triangles(), Pose::new(space.place_back(at.translation), space.turn_back(at.rotation)))
+            })
             .collect();
         let bodies: Vec<(Triangles, Pose)> = bodies.into_iter().chain(tips).collect();
         let hidden = |p: DVec3, radius: f64| {

@@ -1,5 +1,6 @@
-//! The window tried by itself: everything is shown, what it writes is read back, files are dropped on it, every key is pressed and the mouse drags across
-//! the picture, as somebody would who wants to see it break. The first thing that does not do what it should ends it, with words and an exit code.
+//! The window tried by itself: everything is shown, what it writes is read back, files are dropped on it, every key is
+//! pressed and the mouse drags across the picture, as somebody would who wants to see it break. The first thing that
+//! does not do what it should ends it, with words and an exit code.
 
 use crate::camera::Orbit;
 use crate::control::Viewer;
@@ -19,13 +20,15 @@ use sutura_bevy::sutura::input::Recording;
 use sutura_bevy::{Hand, Held, PhysicsClock, Pointer, PointerCamera, Space, Strand, Sutura};
 use sutura_scene::samples;
 
-/// Time that anything may take, and pictures that there are to be in it: the machine may be slow and busy, and some steps do a thing in every picture.
+/// Time that anything may take, and pictures that there are to be in it: the machine may be slow and busy, and some
+/// steps do a thing in every picture.
 const PATIENCE: (Duration, u32) = (Duration::from_secs(60), 200);
 
 /// What a look at a thing under way says: it is done, not yet, or wrong.
 type Verdict = Result<bool, String>;
 
-/// Something to do and what is to come of it. It is looked at in every picture after it was begun, with the number of pictures since.
+/// Something to do and what is to come of it. It is looked at in every picture after it was begun, with the number of
+/// pictures since.
 struct Step {
     name: &'static str,
     act: fn(&mut World, &mut Notes),
@@ -47,29 +50,93 @@ struct Notes {
 }
 
 const STEPS: &[Step] = &[
-    Step { name: "the window shows a scene", act: |_, _| (), look: |world, _, n| Ok(n >= 20 && !world.resource::<Stage>().frames.is_empty()) },
+    Step {
+        name: "the window shows a scene",
+        act: |_, _| (),
+        look: |world, _, n| Ok(n >= 20 && !world.resource::<Stage>().frames.is_empty()),
+    },
     Step { name: "time goes on while everything is shown", act: show_everything, look: time_goes_on },
     Step { name: "every panel is open", act: |_, _| (), look: panels_are_open },
-    Step { name: "a picture is written (F12)", act: |w, n| press(w, n, KeyCode::F12), look: |_, notes, _| pictures(&notes.folder, 1) },
-    Step { name: "a sequence of pictures begins (F11)", act: |w, n| press(w, n, KeyCode::F11), look: |world, _, n| sequence(world, n, 3) },
-    Step { name: "a sequence of pictures is written (F11)", act: |w, n| press(w, n, KeyCode::F11), look: sequence_is_written },
-    Step { name: "it is paused (Space)", act: |w, n| press(w, n, KeyCode::Space), look: |w, _, _| Ok(!w.resource::<PhysicsClock>().running) },
-    Step { name: "the scene begins again (Backspace)", act: |w, n| press(w, n, KeyCode::Backspace), look: |w, n, k| opened(w, n, "", k) },
+    Step {
+        name: "a picture is written (F12)",
+        act: |w, n| press(w, n, KeyCode::F12),
+        look: |_, notes, _| pictures(&notes.folder, 1),
+    },
+    Step {
+        name: "a sequence of pictures begins (F11)",
+        act: |w, n| press(w, n, KeyCode::F11),
+        look: |world, _, n| sequence(world, n, 3),
+    },
+    Step {
+        name: "a sequence of pictures is written (F11)",
+        act: |w, n| press(w, n, KeyCode::F11),
+        look: sequence_is_written,
+    },
+    Step {
+        name: "it is paused (Space)",
+        act: |w, n| press(w, n, KeyCode::Space),
+        look: |w, _, _| Ok(!w.resource::<PhysicsClock>().running),
+    },
+    Step {
+        name: "the scene begins again (Backspace)",
+        act: |w, n| press(w, n, KeyCode::Backspace),
+        look: |w, n, k| opened(w, n, "", k),
+    },
     Step { name: "a thread follows the mouse", act: take_thread, look: thread_follows },
-    Step { name: "what is let go is let go", act: |w, n| button(w, n, MouseButton::Left, ButtonState::Released), look: |w, _, n| let_go(w, n) },
+    Step {
+        name: "what is let go is let go",
+        act: |w, n| button(w, n, MouseButton::Left, ButtonState::Released),
+        look: |w, _, n| let_go(w, n),
+    },
     Step { name: "what was shown is written as GLB (F9)", act: |w, n| press(w, n, KeyCode::F9), look: glb_is_read },
-    Step { name: "what was done is written and done again (F5)", act: |w, n| press(w, n, KeyCode::F5), look: input_is_replayed },
-    Step { name: "a scene dropped on the window is played", act: |w, n| drop_file(w, n, "good.toml"), look: |w, n, k| opened(w, n, "good.toml", k) },
+    Step {
+        name: "what was done is written and done again (F5)",
+        act: |w, n| press(w, n, KeyCode::F5),
+        look: input_is_replayed,
+    },
+    Step {
+        name: "a scene dropped on the window is played",
+        act: |w, n| drop_file(w, n, "good.toml"),
+        look: |w, n, k| opened(w, n, "good.toml", k),
+    },
     Step { name: "its time goes on", act: note_time, look: time_goes_on },
-    Step { name: "a broken scene dropped on the window says what is wrong and where", act: |w, n| drop_file(w, n, "broken.toml"), look: error_is_shown },
-    Step { name: "the error goes away (Esc)", act: |w, n| press(w, n, KeyCode::Escape), look: |w, _, _| Ok(w.resource::<Stage>().error.is_none()) },
+    Step {
+        name: "a broken scene dropped on the window says what is wrong and where",
+        act: |w, n| drop_file(w, n, "broken.toml"),
+        look: error_is_shown,
+    },
+    Step {
+        name: "the error goes away (Esc)",
+        act: |w, n| press(w, n, KeyCode::Escape),
+        look: |w, _, _| Ok(w.resource::<Stage>().error.is_none()),
+    },
     Step { name: "and the scene goes on", act: note_time, look: time_goes_on },
-    Step { name: "a recording dropped on the window is played", act: drop_recording, look: |w, n, k| opened(w, n, "recording.sutura", k) },
+    Step {
+        name: "a recording dropped on the window is played",
+        act: drop_recording,
+        look: |w, n, k| opened(w, n, "recording.sutura", k),
+    },
     Step { name: "its time goes on too", act: note_time, look: time_goes_on },
-    Step { name: "the first sample scene (Page down)", act: |w, n| press(w, n, KeyCode::PageDown), look: |w, n, k| opened(w, n, samples()[0].name, k) },
-    Step { name: "the next one (Page down)", act: |w, n| press(w, n, KeyCode::PageDown), look: |w, n, k| opened(w, n, samples()[1].name, k) },
-    Step { name: "the one before (Page up)", act: |w, n| press(w, n, KeyCode::PageUp), look: |w, n, k| opened(w, n, samples()[0].name, k) },
-    Step { name: "from the beginning (Backspace)", act: |w, n| press(w, n, KeyCode::Backspace), look: |w, n, k| opened(w, n, samples()[0].name, k) },
+    Step {
+        name: "the first sample scene (Page down)",
+        act: |w, n| press(w, n, KeyCode::PageDown),
+        look: |w, n, k| opened(w, n, samples()[0].name, k),
+    },
+    Step {
+        name: "the next one (Page down)",
+        act: |w, n| press(w, n, KeyCode::PageDown),
+        look: |w, n, k| opened(w, n, samples()[1].name, k),
+    },
+    Step {
+        name: "the one before (Page up)",
+        act: |w, n| press(w, n, KeyCode::PageUp),
+        look: |w, n, k| opened(w, n, samples()[0].name, k),
+    },
+    Step {
+        name: "from the beginning (Backspace)",
+        act: |w, n| press(w, n, KeyCode::Backspace),
+        look: |w, n, k| opened(w, n, samples()[0].name, k),
+    },
     Step { name: "its time goes on as well", act: note_time, look: time_goes_on },
     Step { name: "every key is pressed and the mouse drags", act: |_, _| (), look: bother },
 ];
@@ -79,7 +146,10 @@ pub(crate) fn build(app: &mut App) {
     app.world_mut().resource_mut::<Viewer>().folder = folder.clone();
     app.init_resource::<Panels>().add_systems(EguiPrimaryContextPass, measure.after(crate::panel::show));
     let mut run = Run { folder, notes: None, step: 0, begun: None };
-    app.add_systems(First, (move |world: &mut World| run.go_on(world)).before(bevy::ecs::message::MessageUpdateSystems));
+    app.add_systems(
+        First,
+        (move |world: &mut World| run.go_on(world)).before(bevy::ecs::message::MessageUpdateSystems),
+    );
 }
 
 struct Run {
@@ -98,7 +168,16 @@ impl Run {
                 return fail(world, "files to drop", &format!("{}: {e}", self.folder.display()));
             }
             let (folder, name) = (self.folder.clone(), String::new());
-            self.notes = Some(Notes { window, folder, time: 0.0, generation: 0, name, at: Vec2::ZERO, place: Vec3::ZERO, down: Vec::new() });
+            self.notes = Some(Notes {
+                window,
+                folder,
+                time: 0.0,
+                generation: 0,
+                name,
+                at: Vec2::ZERO,
+                place: Vec3::ZERO,
+                down: Vec::new(),
+            });
         }
         let Some(notes) = &mut self.notes else { return };
         for key in std::mem::take(&mut notes.down) {
@@ -125,7 +204,8 @@ impl Run {
             Ok(false) if when.elapsed() < PATIENCE.0 || *pictures < PATIENCE.1 => {}
             Ok(false) => {
                 let clock = world.resource::<PhysicsClock>();
-                let state = format!("running {}, {} frames of physics, {:.1} ms each", clock.running, clock.frames, clock.ms);
+                let state =
+                    format!("running {}, {} frames of physics, {:.1} ms each", clock.running, clock.frames, clock.ms);
                 fail(
                     world,
                     step.name,
@@ -202,7 +282,8 @@ fn context(world: &mut World) -> Option<egui::Context> {
 /// Overlays, help, all panels with all that folds open.
 fn show_everything(world: &mut World, notes: &mut Notes) {
     let mut viewer = world.resource_mut::<Viewer>();
-    (viewer.tension, viewer.frames, viewer.contacts, viewer.primitives, viewer.knot, viewer.help, viewer.panels) = (true, true, true, true, true, true, true);
+    (viewer.tension, viewer.frames, viewer.contacts, viewer.primitives, viewer.knot, viewer.help, viewer.panels) =
+        (true, true, true, true, true, true, true);
     if let Some(context) = context(world) {
         context.memory_mut(|m| m.set_everything_is_visible(true));
     }
@@ -244,7 +325,13 @@ fn measure(mut panels: ResMut<Panels>, mut contexts: Query<&mut EguiContext, Wit
     panels.0 = PANELS.map(|name| {
         // A window is known by its title, which may be none.
         let id = egui::Id::new(Some(name));
-        context.memory(|m| if m.areas().is_visible(&egui::LayerId::new(egui::Order::Middle, id)) { m.area_rect(id).map_or(0.0, |r| r.height()) } else { 0.0 })
+        context.memory(|m| {
+            if m.areas().is_visible(&egui::LayerId::new(egui::Order::Middle, id)) {
+                m.area_rect(id).map_or(0.0, |r| r.height())
+            } else {
+                0.0
+            }
+        })
     });
 }
 
@@ -265,7 +352,8 @@ fn picture(path: &Path) -> Verdict {
     let mut data = vec![0; reader.output_buffer_size().unwrap_or(0)];
     let Ok(info) = reader.next_frame(&mut data) else { return Ok(false) };
     let bytes = info.color_type.samples();
-    let colors: std::collections::BTreeSet<&[u8]> = data[..info.buffer_size()].chunks_exact(bytes).map(|p| &p[..bytes.min(3)]).collect();
+    let colors: std::collections::BTreeSet<&[u8]> =
+        data[..info.buffer_size()].chunks_exact(bytes).map(|p| &p[..bytes.min(3)]).collect();
     if colors.len() < 20 { Err(format!("{} has {} colors", path.display(), colors.len())) } else { Ok(true) }
 }
 
@@ -297,8 +385,9 @@ fn take_thread(world: &mut World, notes: &mut Notes) {
     notes.at = Vec2::ZERO;
 }
 
-/// The pointer takes a thread while the scene is paused, since one that falls may be gone when a slow picture shows where it was. Then the scene goes on, and
-/// the pointer moves up by a part of the window's height, where a thread that hangs has room.
+/// The pointer takes a thread while the scene is paused, since one that falls may be gone when a slow picture shows
+/// where it was. Then the scene goes on, and the pointer moves up by a part of the window's height, where a thread that
+/// hangs has room.
 fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdict {
     let up = world.get::<Window>(notes.window).map_or(0.0, Window::height) / 12.0;
     match pictures {
@@ -329,7 +418,8 @@ fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
         }
         _ => {
             let now = grip_of_hand(world, notes)?;
-            let moved = pixels(world, world.resource::<Space>().place(now)).zip(pixels(world, notes.place)).map(|(a, b)| a - b);
+            let moved =
+                pixels(world, world.resource::<Space>().place(now)).zip(pixels(world, notes.place)).map(|(a, b)| a - b);
             match moved {
                 Some(m) if m.x.abs() < 6.0 && (m.y + up).abs() < 6.0 => Ok(true),
                 _ if pictures < 60 => Ok(false),
@@ -342,7 +432,9 @@ fn thread_follows(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdic
 /// Where the mouse holds a thread.
 fn grip_of_hand(world: &mut World, notes: &Notes) -> Result<DVec3, String> {
     match world.resource::<Hand>().held {
-        Some(Held::Thread(grip)) => world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position).ok_or_else(|| "its grip is gone".into()),
+        Some(Held::Thread(grip)) => {
+            world.get::<sutura_bevy::Grip>(grip).map(|g| g.pose().position).ok_or_else(|| "its grip is gone".into())
+        }
         _ => Err(nothing_held(world, notes)),
     }
 }
@@ -350,7 +442,11 @@ fn grip_of_hand(world: &mut World, notes: &Notes) -> Result<DVec3, String> {
 fn nothing_held(world: &mut World, notes: &Notes) -> String {
     let cursor = world.get::<Window>(notes.window).and_then(Window::cursor_position);
     let (at, thread, pointer) = (notes.at, middle(world), world.resource::<Pointer>());
-    let state = format!("{}, {}", if pointer.busy { "over a panel" } else { "over no panel" }, if pointer.pressed { "button down" } else { "button up" });
+    let state = format!(
+        "{}, {}",
+        if pointer.busy { "over a panel" } else { "over no panel" },
+        if pointer.pressed { "button down" } else { "button up" }
+    );
     format!("the mouse holds nothing: it went to {at}, is at {cursor:?} ({state}), a thread at {thread:?}")
 }
 
@@ -365,7 +461,12 @@ fn pixels(world: &World, at: Vec3) -> Option<Vec2> {
 fn middle(world: &mut World) -> Option<Vec2> {
     let space = *world.resource::<Space>();
     let size = world.query_filtered::<&Window, With<PrimaryWindow>>().single(world).ok()?.size();
-    let places: Vec<_> = world.query::<&Strand>().iter(world).filter_map(|s| s.positions.get(s.positions.len() / 2)).map(|p| space.place(*p)).collect();
+    let places: Vec<_> = world
+        .query::<&Strand>()
+        .iter(world)
+        .filter_map(|s| s.positions.get(s.positions.len() / 2))
+        .map(|p| space.place(*p))
+        .collect();
     places.into_iter().filter_map(|p| pixels(world, p)).find(|p| p.min_element() > 0.0 && p.cmplt(size).all())
 }
 
@@ -377,17 +478,26 @@ fn let_go(world: &mut World, pictures: u32) -> Verdict {
 /// The file that the viewer wrote last with this ending.
 fn written(folder: &Path, ending: &str) -> Option<PathBuf> {
     let files = std::fs::read_dir(folder).ok()?.filter_map(|e| Some(e.ok()?.path()));
-    let numbered = |p: &PathBuf| p.extension().is_some_and(|e| e == ending) && p.file_stem().is_some_and(|s| s.len() == 3);
+    let numbered =
+        |p: &PathBuf| p.extension().is_some_and(|e| e == ending) && p.file_stem().is_some_and(|s| s.len() == 3);
     files.filter(numbered).max()
 }
 
 fn glb_is_read(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdict {
     let Some(path) = written(&notes.folder, "glb") else {
-        return if pictures > 5 { Err(format!("there is no file; {}", world.resource::<Viewer>().message)) } else { Ok(false) };
+        return if pictures > 5 {
+            Err(format!("there is no file; {}", world.resource::<Viewer>().message))
+        } else {
+            Ok(false)
+        };
     };
     let bytes = std::fs::read(&path).map_err(|e| e.to_string())?;
     let file = gltf::Gltf::from_slice(&bytes).map_err(|e| format!("{}: {e}", path.display()))?;
-    let keys = file.animations().flat_map(|a| a.channels().map(|c| c.sampler().input().count()).collect::<Vec<_>>()).max().unwrap_or(0);
+    let keys = file
+        .animations()
+        .flat_map(|a| a.channels().map(|c| c.sampler().input().count()).collect::<Vec<_>>())
+        .max()
+        .unwrap_or(0);
     if file.skins().count() == 0 || keys < 5 {
         return Err(format!("{} skins, {keys} keys of animation", file.skins().count()));
     }
@@ -396,7 +506,11 @@ fn glb_is_read(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdict {
 
 fn input_is_replayed(world: &mut World, notes: &mut Notes, pictures: u32) -> Verdict {
     let Some(path) = written(&notes.folder, "sutura") else {
-        return if pictures > 5 { Err(format!("there is no file; {}", world.resource::<Viewer>().message)) } else { Ok(false) };
+        return if pictures > 5 {
+            Err(format!("there is no file; {}", world.resource::<Viewer>().message))
+        } else {
+            Ok(false)
+        };
     };
     let bytes = std::fs::read(&path).map_err(|e| e.to_string())?;
     let recording = Recording::from_bytes(&bytes).map_err(|e| format!("{}: {e}", path.display()))?;

@@ -8,7 +8,9 @@ use bevy::window::FileDragAndDrop;
 use std::time::Duration;
 use sutura_bevy::sutura::glam::DVec3;
 use sutura_bevy::sutura::input::{Input, Recording};
-use sutura_bevy::sutura::{Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Solver, Stretch, World as Engine};
+use sutura_bevy::sutura::{
+    Friction, Handle, Integrator, Material, PaperSettings, Plasticity, Rod, Settings, Solver, Stretch, World as Engine,
+};
 use sutura_bevy::{Grip, Hand, Held, Live, PhysicsClock, Pointer, Space, Sutura};
 use sutura_view::ViewerPlugin;
 use sutura_view::control::{Viewer, go_to, open};
@@ -32,7 +34,14 @@ fn app(scene: &str, folder: &std::path::Path) -> App {
 /// A key as the window reports it.
 fn key(app: &mut App, key_code: KeyCode, state: ButtonState) {
     let logical_key = Key::Unidentified(NativeKey::Unidentified);
-    app.world_mut().write_message(KeyboardInput { key_code, logical_key, state, text: None, repeat: false, window: Entity::PLACEHOLDER });
+    app.world_mut().write_message(KeyboardInput {
+        key_code,
+        logical_key,
+        state,
+        text: None,
+        repeat: false,
+        window: Entity::PLACEHOLDER,
+    });
 }
 
 fn press(app: &mut App, code: KeyCode) {
@@ -82,7 +91,9 @@ fn every_key_in_any_state_does_no_harm() {
 fn a_recording_and_the_past_show_the_tensions_that_there_were() {
     let folder = tempfile::tempdir().unwrap();
     let mut app = app("catenary", folder.path());
-    let tensions = |app: &mut App| -> Vec<f64> { app.world_mut().query::<&sutura_bevy::Strand>().iter(app.world()).next().unwrap().tensions.clone() };
+    let tensions = |app: &mut App| -> Vec<f64> {
+        app.world_mut().query::<&sutura_bevy::Strand>().iter(app.world()).next().unwrap().tensions.clone()
+    };
     while app.world().resource::<Stage>().frames.len() < 40 {
         app.update();
     }
@@ -163,9 +174,11 @@ fn a_hand_in_a_scene_is_recorded_with_it_and_done_again() {
     let at = rod(&app);
     let space = *app.world().resource::<Space>();
     let look = |app: &mut App, at: DVec3, pressed: bool| {
-        let ray = Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
+        let ray =
+            Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
         let mut pointer = app.world_mut().resource_mut::<Pointer>();
-        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) = (Some(ray), space.direction(DVec3::Y), pressed, 0.02);
+        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) =
+            (Some(ray), space.direction(DVec3::Y), pressed, 0.02);
         app.update();
     };
     look(&mut app, at, true);
@@ -186,7 +199,11 @@ fn a_hand_in_a_scene_is_recorded_with_it_and_done_again() {
 fn assert_done_again(app: &mut App, folder: &std::path::Path) -> Recording {
     press(app, KeyCode::Space);
     press(app, KeyCode::F5);
-    let file = std::fs::read_dir(folder).unwrap().filter_map(Result::ok).map(|e| e.path()).find(|p| p.extension().is_some_and(|e| e == "sutura"));
+    let file = std::fs::read_dir(folder)
+        .unwrap()
+        .filter_map(Result::ok)
+        .map(|e| e.path())
+        .find(|p| p.extension().is_some_and(|e| e == "sutura"));
     let bytes = std::fs::read(file.unwrap()).unwrap();
     let recording = Recording::from_bytes(&bytes).unwrap();
     let again = recording.replay(&mut |step| {
@@ -220,23 +237,36 @@ fn what_is_changed_while_it_runs_is_recorded_and_done_again() {
     change(&mut app, vec![]);
     let rod = first_thread(&app);
     let (settings, material) = (engine(&app).settings().clone(), engine(&app).rod(rod).unwrap().material().clone());
-    let lowest = |app: &App| engine(app).rod(rod).unwrap().positions().iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+    let lowest =
+        |app: &App| engine(app).rod(rod).unwrap().positions().iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
     let plastic = Plasticity { yield_curvature: 50.0, yield_twist: 80.0, hardening: 0.1 };
-    let soft = Material { young_modulus: 0.1 * material.young_modulus, density: 3.0 * material.density, ..material.clone() };
+    let soft =
+        Material { young_modulus: 0.1 * material.young_modulus, density: 3.0 * material.density, ..material.clone() };
     change(&mut app, vec![Change::Material(rod, soft.clone()), Change::Friction(0, 0, Friction::coulomb(0.7))]);
     assert_eq!(engine(&app).rod(rod).unwrap().material(), &soft);
     assert_eq!(engine(&app).friction(0, 0), Friction::coulomb(0.7));
-    let other = if engine(&app).rod(rod).unwrap().stretch() == Stretch::Elastic { Stretch::Inextensible } else { Stretch::Elastic };
+    let other = if engine(&app).rod(rod).unwrap().stretch() == Stretch::Elastic {
+        Stretch::Inextensible
+    } else {
+        Stretch::Elastic
+    };
     change(&mut app, vec![Change::Stretch(rod, other)]);
     assert_eq!(engine(&app).rod(rod).unwrap().stretch(), other);
-    let paper = Settings { solver: Solver::Paper(PaperSettings::default()), integrator: Integrator::TrBdf2, ..settings.clone() };
+    let paper = Settings {
+        solver: Solver::Paper(PaperSettings::default()),
+        integrator: Integrator::TrBdf2,
+        ..settings.clone()
+    };
     change(&mut app, vec![Change::Settings(paper.clone())]);
     assert_eq!(engine(&app).settings(), &paper);
     let low = lowest(&app);
     change(&mut app, vec![]);
     assert_ne!(lowest(&app), low, "it moves");
     change(&mut app, vec![Change::Settings(Settings { integrator: Integrator::TrBdf2, ..settings.clone() })]);
-    change(&mut app, vec![Change::Material(rod, Material { plasticity: Some(plastic), bend_damping: 0.01, ..soft.clone() })]);
+    change(
+        &mut app,
+        vec![Change::Material(rod, Material { plasticity: Some(plastic), bend_damping: 0.01, ..soft.clone() })],
+    );
     // Refused: it says why, and nothing changes, nor is what follows it done.
     let before = engine(&app).settings().clone();
     app.world_mut().resource_mut::<PhysicsClock>().running = false;
@@ -365,7 +395,9 @@ fn what_is_taken_over_stays_where_it_was_left_and_goes_back_without_a_jump() {
         let (_, grip) = play.0.grips().find(|g| g.0 == "right").unwrap();
         play.0.world().grip_pose(grip.unwrap()).unwrap().position
     };
-    let bar = |app: &App| app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.shape_poses().next().unwrap().position;
+    let bar = |app: &App| {
+        app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.shape_poses().next().unwrap().position
+    };
     let time = |app: &App| app.world().resource::<Sutura>().simulation::<Play>().unwrap().0.time();
     // In the middle of its motion the keys take the grip over: it stands, then goes where they lead it.
     fastest(&mut app, 30, &right);
@@ -383,7 +415,8 @@ fn what_is_taken_over_stays_where_it_was_left_and_goes_back_without_a_jump() {
     press(&mut app, KeyCode::Digit2);
     assert!(fastest(&mut app, 20, &right) < 1e-9);
     assert!(time(&app) < 2.0);
-    // Given back, it goes to where the scene has it, smoothly: no faster than 5 cm/s beside the scene's own motion (at most 19 mm/s).
+    // Given back, it goes to where the scene has it, smoothly: no faster than 5 cm/s beside the scene's own motion (at
+    // most 19 mm/s).
     press(&mut app, KeyCode::KeyG);
     let fast = fastest(&mut app, 60, &right);
     assert!(fast > 0.01 && fast < 0.05 + 0.019, "{fast}");
@@ -409,9 +442,11 @@ fn what_is_taken_over_stays_where_it_was_left_and_goes_back_without_a_jump() {
     // The same with the bar, by the mouse.
     let space = *app.world().resource::<Space>();
     let look = |app: &mut App, at: DVec3, pressed: bool| {
-        let ray = Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
+        let ray =
+            Ray3d::new(space.place(at + DVec3::new(0.0, -0.3, 0.0)), Dir3::new(space.direction(DVec3::Y)).unwrap());
         let mut pointer = app.world_mut().resource_mut::<Pointer>();
-        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) = (Some(ray), space.direction(DVec3::Y), pressed, 0.002);
+        (pointer.ray, pointer.forward, pointer.pressed, pointer.reach) =
+            (Some(ray), space.direction(DVec3::Y), pressed, 0.002);
         app.update();
     };
     let home = bar(&app);
@@ -448,7 +483,9 @@ fn a_key_moves_its_grip_in_the_physics_of_the_same_picture() {
     let folder = tempfile::tempdir().unwrap();
     let mut app = app("catenary", folder.path());
     press(&mut app, KeyCode::Digit1);
-    let pose = |app: &App| app.world().get::<Grip>(app.world().resource::<Viewer>().grips[0].unwrap()).unwrap().pose().position;
+    let pose = |app: &App| {
+        app.world().get::<Grip>(app.world().resource::<Viewer>().grips[0].unwrap()).unwrap().pose().position
+    };
     let (before, frames) = (pose(&app), app.world().resource::<PhysicsClock>().frames);
     key(&mut app, KeyCode::KeyW, ButtonState::Pressed);
     app.update();

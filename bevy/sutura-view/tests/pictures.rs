@@ -1,5 +1,5 @@
-//! Pictures without a display: each sample scene has its threads where they are, and nowhere else. Pictures that are wrong are left in the
-//! build folder.
+//! Pictures without a display: each sample scene has its threads where they are, and nowhere else. Pictures that are
+//! wrong are left in the build folder.
 //!
 //! These want a Vulkan driver (`scripts/viewer_setup.sh` installs one in software), and fail without.
 
@@ -15,7 +15,8 @@ const SIZE: (u32, u32) = (640, 360);
 /// A color that nothing else has.
 const MAGENTA: Srgba = Srgba::rgb(0.95, 0.05, 0.95);
 
-/// Whether a pixel shows some thread: more red and blue than green. Drape has more green, steel as much of each, the marks of grips more green than blue.
+/// Whether a pixel shows some thread: more red and blue than green. Drape has more green, steel as much of each, the
+/// marks of grips more green than blue.
 fn is_thread(pixel: [u8; 3]) -> bool {
     pixel[0].min(pixel[2]) > pixel[1].saturating_add(6)
 }
@@ -31,7 +32,8 @@ fn paint(world: &mut World) {
 fn judge(picture: &Picture, threads: &[Vec<(f32, f32, bool)>], width: f32) -> Result<(), String> {
     let (w, h) = (picture.width as i32, picture.height as i32);
     let at = |x: i32, y: i32| (x >= 0 && y >= 0 && x < w && y < h).then(|| picture.at(x as u32, y as u32));
-    let near = |x: f32, y: f32| (-1..=1).any(|i| (-1..=1).any(|j| at(x as i32 + i, y as i32 + j).is_some_and(is_thread)));
+    let near =
+        |x: f32, y: f32| (-1..=1).any(|i| (-1..=1).any(|j| at(x as i32 + i, y as i32 + j).is_some_and(is_thread)));
     let (mut seen, mut all) = (0, 0);
     // Within half its width and a few pixels of the centerline; nearer parts are wider than the middle.
     let reach = 0.75 * width + 3.0;
@@ -95,7 +97,8 @@ fn each_sample_scene_has_its_threads_where_they_are() {
     assert!(wrong.is_empty(), "{wrong:#?}, pictures in {}", folder.display());
     // The check itself: threads that are not where they are said to be are noticed.
     let (picture, threads) = (studio.draw().unwrap(), studio.threads());
-    let moved: Vec<Vec<(f32, f32, bool)>> = threads.iter().map(|t| t.iter().map(|(x, y, h)| (x + 25.0, y + 12.0, *h)).collect()).collect();
+    let moved: Vec<Vec<(f32, f32, bool)>> =
+        threads.iter().map(|t| t.iter().map(|(x, y, h)| (x + 25.0, y + 12.0, *h)).collect()).collect();
     assert!(judge(&picture, &moved, 1.0).is_err());
 }
 
@@ -140,7 +143,8 @@ fn the_graphics_processor_skins_as_the_engine_does() {
     // The same skin, posed by the engine and drawn as it is.
     let world = studio.world();
     let space = *world.resource::<Space>();
-    let (strand, drawn) = world.query::<(&Strand, &Drawn)>().single(world).map(|(s, d)| (s.clone(), d.clone())).unwrap();
+    let (strand, drawn) =
+        world.query::<(&Strand, &Drawn)>().single(world).map(|(s, d)| (s.clone(), d.clone())).unwrap();
     let skin = Skin::new(&strand.skin).unwrap();
     let mut bones = vec![Bone::default(); skin.n_bones()];
     skin.bones_at(&strand.positions, &strand.orientations, &mut bones);

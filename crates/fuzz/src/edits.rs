@@ -4,9 +4,9 @@ use crate::finite;
 use crate::input::Input;
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, Load, LoadKind, LoadSpec, Material, PaperSettings, Place, Plasticity,
-    Pose, Profile, Reel, ReelLaw, ReelSpec, RestShape, Rod, RodSpec, Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, Weld, WeldRest,
-    WeldSpec, World,
+    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, Load, LoadKind, LoadSpec,
+    Material, PaperSettings, Place, Plasticity, Pose, Profile, Reel, ReelLaw, ReelSpec, RestShape, Rod, RodSpec,
+    Section, Settings, Shape, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, Weld, WeldRest, WeldSpec, World,
 };
 
 /// What one input may do: edits, threads, elements of one, substeps in all.
@@ -14,7 +14,8 @@ const MOST_EDITS: u32 = 60;
 const MOST_THREADS: usize = 3;
 const MOST_ELEMENTS: usize = 10;
 const MOST_SUBSTEPS: f64 = 40.0;
-/// Where there are reels, which may feed in a thousand elements a substep: substeps of one step, and elements beyond which an input is at its end.
+/// Where there are reels, which may feed in a thousand elements a substep: substeps of one step, and elements beyond
+/// which an input is at its end.
 const MOST_REELED: f64 = 4.0;
 const MOST_FED: usize = 500;
 
@@ -35,8 +36,17 @@ pub fn run(data: &[u8]) {
     let mut input = Input::new(data);
     let settings = Settings { halvings: 2, ..Settings::default() };
     let world = World::new(settings).unwrap_or_else(|e| panic!("{e}"));
-    let mut session =
-        Session { world, rods: vec![], shapes: vec![], grips: vec![], loads: vec![], welds: vec![], reels: vec![], snapshots: vec![], substeps: 0.0 };
+    let mut session = Session {
+        world,
+        rods: vec![],
+        shapes: vec![],
+        grips: vec![],
+        loads: vec![],
+        welds: vec![],
+        reels: vec![],
+        snapshots: vec![],
+        substeps: 0.0,
+    };
     for _ in 0..MOST_EDITS {
         if input.is_empty() || session.substeps > MOST_SUBSTEPS {
             break;
@@ -53,14 +63,26 @@ impl Session {
             _ if which >= 240 => self.edit_joined(which, input),
             0..=1 => self.insert_rod(input),
             2 => {
-                let shape = ShapeSpec { geometry: geometry(input), pose: pose(input), surface: input.below(3) as u32, motion: motion(input), open: true };
+                let shape = ShapeSpec {
+                    geometry: geometry(input),
+                    pose: pose(input),
+                    surface: input.below(3) as u32,
+                    motion: motion(input),
+                    open: true,
+                };
                 self.shapes.extend(self.world.insert_shape(&shape));
             }
             3..=4 => {
                 if let Some(rod) = pick(&self.rods, input) {
                     let hold = input.pick(&[Hold::Pin, Hold::Clamp, Hold::Jaw]);
                     let ramp = if input.truth() { 0.0 } else { input.number(0.01) };
-                    self.grips.extend(self.world.insert_grip(&GripSpec { rod, place: place(input), hold, drive: drive(input), ramp }));
+                    self.grips.extend(self.world.insert_grip(&GripSpec {
+                        rod,
+                        place: place(input),
+                        hold,
+                        drive: drive(input),
+                        ramp,
+                    }));
                 }
             }
             5 => {
@@ -100,7 +122,11 @@ impl Session {
             }
             12 => {
                 if let Some(shape) = pick(&self.shapes, input) {
-                    let _ = if input.truth() { self.world.set_shape_motion(shape, motion(input)) } else { self.world.remove_shape(shape) };
+                    let _ = if input.truth() {
+                        self.world.set_shape_motion(shape, motion(input))
+                    } else {
+                        self.world.remove_shape(shape)
+                    };
                 }
             }
             13 => {
@@ -129,7 +155,8 @@ impl Session {
         match which {
             240..=242 => self.branch(input),
             243 => {
-                let places = (0..2 + input.below(2)).filter_map(|_| Some((pick(&self.rods, input)?, place(input)))).collect();
+                let places =
+                    (0..2 + input.below(2)).filter_map(|_| Some((pick(&self.rods, input)?, place(input)))).collect();
                 let rest = input.pick(&[WeldRest::AsInserted, WeldRest::Straight]);
                 self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest }));
             }
@@ -150,7 +177,12 @@ impl Session {
             246..=248 => {
                 if let Some(rod) = pick(&self.rods, input) {
                     let supply = if input.truth() { Some(input.size(5e-3)) } else { None };
-                    self.reels.extend(self.world.insert_reel(&ReelSpec { rod, at_end: input.truth(), law: law(input), supply }));
+                    self.reels.extend(self.world.insert_reel(&ReelSpec {
+                        rod,
+                        at_end: input.truth(),
+                        law: law(input),
+                        supply,
+                    }));
                 }
             }
             249..=250 => {
@@ -165,7 +197,14 @@ impl Session {
             253 => {
                 if self.world.view().rods().count() < MOST_THREADS {
                     let material = Material { bend_damping: input.size(0.01), ..Material::elastic(2e9, 1150.0) };
-                    let spec = RodSpec::ring(input.vector(2e-3), DVec3::Z, DVec3::X * input.size(5e-3), 3 + input.below(10), 1.5e-4, material);
+                    let spec = RodSpec::ring(
+                        input.vector(2e-3),
+                        DVec3::Z,
+                        DVec3::X * input.size(5e-3),
+                        3 + input.below(10),
+                        1.5e-4,
+                        material,
+                    );
                     let stretch = input.pick(&[Stretch::Elastic, Stretch::Inextensible]);
                     let rest = if input.truth() { RestShape::Straight } else { RestShape::AsInserted };
                     let closure = Some(Closure { twist: input.number(3.0) });
@@ -186,7 +225,11 @@ impl Session {
                 }
             }
             1 => {
-                let paper = PaperSettings { iterations: 1 + input.below(5) as u32, direct_distance: input.truth(), ..PaperSettings::default() };
+                let paper = PaperSettings {
+                    iterations: 1 + input.below(5) as u32,
+                    direct_distance: input.truth(),
+                    ..PaperSettings::default()
+                };
                 let solver = input.pick(&[Solver::Direct, Solver::Paper(paper)]);
                 let _ = self.world.set_settings(Settings { solver, ..self.world.settings().clone() });
             }
@@ -260,7 +303,8 @@ impl Session {
             (spec.roll, spec.pretwist) = (input.number(1.0), input.number(1.0));
         }
         if odd & 8 != 0 {
-            let profile = |input: &mut Input<'_>| Profile(vec![(0.0, input.size(1.0)), (input.size(1e-3), input.size(1.0))]);
+            let profile =
+                |input: &mut Input<'_>| Profile(vec![(0.0, input.size(1.0)), (input.size(1e-3), input.size(1.0))]);
             spec.along = Along { size: profile(input), modulus: profile(input), density: profile(input) };
         }
         odd_material(&mut material, odd, input);
@@ -341,7 +385,8 @@ impl Session {
 /// A material with more to it than stiffness and mass.
 fn odd_material(material: &mut Material, odd: u8, input: &mut Input<'_>) {
     if odd & 16 != 0 {
-        material.shear = if input.truth() { Shear::Poisson(input.number(0.2)) } else { Shear::Modulus(input.size(1e9)) };
+        material.shear =
+            if input.truth() { Shear::Poisson(input.number(0.2)) } else { Shear::Modulus(input.size(1e9)) };
         material.bend_scale = input.size(0.2);
         material.bend_damping = input.size(0.01);
     }
@@ -374,14 +419,20 @@ fn law(input: &mut Input<'_>) -> ReelLaw {
 }
 
 fn drive(input: &mut Input<'_>) -> Drive {
-    if input.truth() { Drive::Pose } else { Drive::Force { direction: input.direction(), force: input.size(0.1), speed_limit: input.size(0.01) } }
+    if input.truth() {
+        Drive::Pose
+    } else {
+        Drive::Force { direction: input.direction(), force: input.size(0.1), speed_limit: input.size(0.01) }
+    }
 }
 
 fn motion(input: &mut Input<'_>) -> ShapeMotion {
     match input.below(3) {
         0 => ShapeMotion::Fixed,
         1 => ShapeMotion::Driven,
-        _ => ShapeMotion::Pushed { direction: input.direction(), force: input.size(0.1), speed_limit: input.size(0.01) },
+        _ => {
+            ShapeMotion::Pushed { direction: input.direction(), force: input.size(0.1), speed_limit: input.size(0.01) }
+        }
     }
 }
 

@@ -49,7 +49,14 @@ pub fn readings(world: &World) -> Found {
         one("writhe", sutura::knot::writhe(rod.positions(), false))?;
         all("momentum", &[rod.momentum()])?;
         let e = rod.energy();
-        for (what, v) in [("kinetic", e.kinetic), ("stretch", e.stretch), ("bend", e.bend), ("twist", e.twist), ("gravity", e.gravity), ("total", e.total())] {
+        for (what, v) in [
+            ("kinetic", e.kinetic),
+            ("stretch", e.stretch),
+            ("bend", e.bend),
+            ("twist", e.twist),
+            ("gravity", e.gravity),
+            ("total", e.total()),
+        ] {
             one(&format!("{what} energy"), v)?;
         }
     }

@@ -83,10 +83,15 @@ impl<'a> Input<'a> {
     pub fn rotation(&mut self) -> DQuat {
         let v = self.vector(1.0);
         let q = DQuat::from_xyzw(v.x, v.y, v.z, self.number(1.0));
-        if self.below(16) == 0 || !(q.is_finite() && q.length() > 0.0 && q.length().is_finite()) { q } else { q.normalize() }
+        if self.below(16) == 0 || !(q.is_finite() && q.length() > 0.0 && q.length().is_finite()) {
+            q
+        } else {
+            q.normalize()
+        }
     }
 
-    /// Bytes that are what is left of the input, or good ones with changes: numbers overwritten, pieces cut out and put in.
+    /// Bytes that are what is left of the input, or good ones with changes: numbers overwritten, pieces cut out and put
+    /// in.
     pub fn changed(mut self, good: &[u8]) -> Vec<u8> {
         if self.below(8) == 0 {
             return self.rest().to_vec();

@@ -22,12 +22,17 @@ pub fn run(data: &[u8]) {
         }
         // Coordinates of a coarse grid: much meets exactly.
         1 => {
-            let points: Vec<DVec3> = input.rest().chunks_exact(3).map(|c| DVec3::from_array([0, 1, 2].map(|i| f64::from(c[i] as i8)))).collect();
+            let points: Vec<DVec3> = input
+                .rest()
+                .chunks_exact(3)
+                .map(|c| DVec3::from_array([0, 1, 2].map(|i| f64::from(c[i] as i8))))
+                .collect();
             look(&points, kind, seed);
         }
         // A walk of short steps: long chains that are tangled closely.
         2 => {
-            let step = |c: &[u8]| DVec3::from_array([0, 1, 2].map(|i| f64::from((c[i / 2] >> (4 * (i % 2))) & 15) - 7.5));
+            let step =
+                |c: &[u8]| DVec3::from_array([0, 1, 2].map(|i| f64::from((c[i / 2] >> (4 * (i % 2))) & 15) - 7.5));
             let walk = input.rest().chunks_exact(2).scan(DVec3::ZERO, |x, c| {
                 *x += step(c);
                 Some(*x)
@@ -54,7 +59,11 @@ fn look(points: &[DVec3], kind: u8, seed: u64) {
         _ => Ends::Free,
     };
     let found = recognize(points, ends, seed);
-    assert!((0.0..=0.25).contains(&found.trimmed) && found.closures_agreed <= found.closures_total && found.projections_agreed <= found.projections_total);
+    assert!(
+        (0.0..=0.25).contains(&found.trimmed)
+            && found.closures_agreed <= found.closures_total
+            && found.projections_agreed <= found.projections_total
+    );
     assert!(found.problem.is_some() || found.knot == KnotType::Unknown || found.determinant > 0, "{found:?}");
     if kind & 128 != 0 {
         assert_eq!(found, recognize(points, ends, seed), "the same seed, another answer");

@@ -1,8 +1,9 @@
-//! What Sutura is fuzzed with. A target is a function of any bytes that panics when it finds a fault: a panic of the product, a number that
-//! is not finite without an incident, a reader whose answer does not read back. The fuzzer (`fuzz/`) and the tests that replay the corpus
-//! (`tests/replay.rs`) run the same functions.
+//! What Sutura is fuzzed with. A target is a function of any bytes that panics when it finds a fault: a panic of the
+//! product, a number that is not finite without an incident, a reader whose answer does not read back. The fuzzer
+//! (`fuzz/`) and the tests that replay the corpus (`tests/replay.rs`) run the same functions.
 //!
-//! The size of what is run is bounded here, where it may be legitimate and only slow; what is absurd in size the product refuses by itself.
+//! The size of what is run is bounded here, where it may be legitimate and only slow; what is absurd in size the
+//! product refuses by itself.
 
 mod edits;
 mod expr;
@@ -40,6 +41,7 @@ pub const TARGETS: &[Target] = &[
 ///
 /// When the input finds a fault; when there is no such target.
 pub fn run(target: &str, data: &[u8]) {
-    let target = TARGETS.iter().find(|t| t.name == target).unwrap_or_else(|| panic!("there is no fuzz target `{target}`"));
+    let target =
+        TARGETS.iter().find(|t| t.name == target).unwrap_or_else(|| panic!("there is no fuzz target `{target}`"));
     (target.run)(data);
 }

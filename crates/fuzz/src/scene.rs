@@ -19,10 +19,12 @@ pub fn run(data: &[u8]) {
     }
 }
 
-/// Whether a number in the text may be a number of elements that takes long to build: any whole number of more than three digits after
-/// the word `elements`.
+/// Whether a number in the text may be a number of elements that takes long to build: any whole number of more than
+/// three digits after the word `elements`.
 fn asks_for_many(text: &str) -> bool {
-    text.split("elements").skip(1).any(|rest| rest.trim_start_matches(|c: char| !c.is_ascii_digit()).chars().take_while(char::is_ascii_digit).count() > 3)
+    text.split("elements").skip(1).any(|rest| {
+        rest.trim_start_matches(|c: char| !c.is_ascii_digit()).chars().take_while(char::is_ascii_digit).count() > 3
+    })
 }
 
 /// Runs a scene for some frames and looks at everything it hands over.
@@ -62,7 +64,10 @@ fn reported(outcome: &Outcome) -> Found {
         one("largest elongation", thread.max_elongation)?;
         one("largest tension", thread.max_tension_n)?;
     }
-    [report.min_clearance.thread_thread, report.min_clearance.thread_shape].into_iter().flatten().try_for_each(|c| one("clearance", c))?;
+    [report.min_clearance.thread_thread, report.min_clearance.thread_shape]
+        .into_iter()
+        .flatten()
+        .try_for_each(|c| one("clearance", c))?;
     one("residual", report.work.max_residual)?;
     one("length error", report.work.max_length_error)?;
     all("gravity", &[report.solver.gravity.into()])?;

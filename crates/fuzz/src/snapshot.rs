@@ -5,8 +5,8 @@ use crate::input::Input;
 use std::sync::OnceLock;
 use sutura::glam::DVec3;
 use sutura::{
-    Closure, Drive, Error, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, ReelLaw, ReelSpec, Rod,
-    RodSpec, Settings, ShapeMotion, ShapeSpec, Stretch, WeldSpec, World,
+    Closure, Drive, Error, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place,
+    Plasticity, Pose, ReelLaw, ReelSpec, Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, Stretch, WeldSpec, World,
 };
 
 /// The worlds, and snapshots of them after some steps.
@@ -78,7 +78,13 @@ fn simple() -> Result<World, Error> {
 
 fn held() -> Result<(World, Handle<Rod>), Error> {
     let mut world = World::new(Settings { halvings: 2, ..Settings::default() })?;
-    let first = world.insert_rod(&RodSpec::straight(DVec3::new(-0.01, 0.0, 0.0), DVec3::new(0.01, 0.0, 0.0), 8, 1.5e-4, material()))?;
+    let first = world.insert_rod(&RodSpec::straight(
+        DVec3::new(-0.01, 0.0, 0.0),
+        DVec3::new(0.01, 0.0, 0.0),
+        8,
+        1.5e-4,
+        material(),
+    ))?;
     world.insert_grip(&GripSpec::at_once(first, Place::Start, Hold::Clamp))?;
     Ok((world, first))
 }
@@ -91,7 +97,8 @@ fn material() -> Material {
 /// Two threads, one across the other, on a post, with every kind of grip and load.
 fn busy() -> Result<World, Error> {
     let (mut world, first) = held()?;
-    let across = RodSpec::straight(DVec3::new(0.0, -0.01, 3.0e-4), DVec3::new(0.0, 0.01, 3.0e-4), 8, 1.5e-4, material());
+    let across =
+        RodSpec::straight(DVec3::new(0.0, -0.01, 3.0e-4), DVec3::new(0.0, 0.01, 3.0e-4), 8, 1.5e-4, material());
     let second = world.insert_rod(&RodSpec { stretch: Stretch::Inextensible, ..across })?;
     let post = Geometry::Cylinder { radius: 2e-3, half_length: 5e-3 };
     world.insert_shape(&ShapeSpec::fixed(post, Pose::at(DVec3::new(3e-3, 0.0, -7.2e-3))))?;
@@ -101,7 +108,10 @@ fn busy() -> Result<World, Error> {
     world.insert_grip(&GripSpec::at_once(second, Place::Start, Hold::Jaw))?;
     let drive = Drive::Force { direction: DVec3::Y, force: 0.1, speed_limit: 0.01 };
     world.insert_grip(&GripSpec { drive, ..GripSpec::new(second, Place::End, Hold::Pin) })?;
-    world.insert_load(&LoadSpec { rod: first, kind: LoadKind::Mass { place: Place::End, mass: 1e-6, inertia: DVec3::splat(1e-14) } })?;
+    world.insert_load(&LoadSpec {
+        rod: first,
+        kind: LoadKind::Mass { place: Place::End, mass: 1e-6, inertia: DVec3::splat(1e-14) },
+    })?;
     world.insert_load(&LoadSpec { rod: first, kind: LoadKind::Uniform { force_per_length: DVec3::Y * 1e-4 } })?;
     let torque = LoadKind::Point { place: Place::Arc(5e-3), force: DVec3::ZERO, torque: DVec3::X * 1e-7 };
     world.insert_load(&LoadSpec { rod: first, kind: torque })?;
@@ -117,10 +127,14 @@ fn joined() -> Result<World, Error> {
     let branch = world.insert_rod(&RodSpec::straight(at, at - DVec3::X * 5e-3, 5, 1.5e-4, material()))?;
     world.insert_weld(&WeldSpec::new(vec![(ring, Place::Particle(6)), (branch, Place::Start)]))?;
     world.insert_grip(&GripSpec::at_once(ring, Place::Start, Hold::Clamp))?;
-    let fed = world.insert_rod(&RodSpec::straight(DVec3::Y * 0.02, DVec3::new(0.01, 0.02, 0.0), 8, 1.5e-4, material()))?;
+    let fed =
+        world.insert_rod(&RodSpec::straight(DVec3::Y * 0.02, DVec3::new(0.01, 0.02, 0.0), 8, 1.5e-4, material()))?;
     world.insert_grip(&GripSpec::at_once(fed, Place::Start, Hold::Clamp))?;
     world.insert_grip(&GripSpec::at_once(fed, Place::End, Hold::Pin))?;
-    world.insert_load(&LoadSpec { rod: fed, kind: LoadKind::Mass { place: Place::Arc(5e-3), mass: 1e-6, inertia: DVec3::ZERO } })?;
+    world.insert_load(&LoadSpec {
+        rod: fed,
+        kind: LoadKind::Mass { place: Place::Arc(5e-3), mass: 1e-6, inertia: DVec3::ZERO },
+    })?;
     world.insert_reel(&ReelSpec { rod: fed, at_end: false, law: ReelLaw::Rate(0.05), supply: None })?;
     world.insert_reel(&ReelSpec { rod: fed, at_end: true, law: ReelLaw::Brake(0.05), supply: Some(0.01) })?;
     Ok(world)

@@ -1,4 +1,5 @@
-//! Recordings. Most changes of one break its checksum, so that inputs are tried as they are and with a checksum that fits.
+//! Recordings. Most changes of one break its checksum, so that inputs are tried as they are and with a checksum that
+//! fits.
 
 use crate::input::Input;
 use std::sync::OnceLock;
@@ -32,7 +33,10 @@ fn read(bytes: &[u8]) {
         assert!(frame.time.is_finite(), "time of a frame {}", frame.time);
         assert!(frame.positions.iter().flatten().flatten().all(|v| v.is_finite()), "a position that is not finite");
         assert!(frame.orientations.iter().flatten().flatten().all(|v| v.is_finite()), "a frame that is not finite");
-        assert!(frame.shapes.iter().all(|(x, q)| x.iter().chain(q).all(|v| v.is_finite())), "the pose of a shape is not finite");
+        assert!(
+            frame.shapes.iter().all(|(x, q)| x.iter().chain(q).all(|v| v.is_finite())),
+            "the pose of a shape is not finite"
+        );
         assert!(frame.grips.iter().flatten().flatten().all(|v| v.is_finite()), "the place of a grip is not finite");
     }
     assert_eq!(trajectory.nearest(0.5).is_some(), !trajectory.frames.is_empty());

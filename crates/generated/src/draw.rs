@@ -1,5 +1,5 @@
-//! Numbers from which a scene is drawn: those of a list, for a test tool that makes them simpler one by one, or those of a seed. Zero is
-//! the simplest choice everywhere, and a list that has come to its end goes on with zeros.
+//! Numbers from which a scene is drawn: those of a list, for a test tool that makes them simpler one by one, or those
+//! of a seed. Zero is the simplest choice everywhere, and a list that has come to its end goes on with zeros.
 
 use sutura::glam::{DQuat, DVec3};
 use sutura::math::exp;

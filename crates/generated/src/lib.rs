@@ -1,5 +1,6 @@
-//! Scenes made by a generator, for properties that must hold of every one: [`make`] draws them, [`way`] does to them what must not change
-//! the answer, [`play`] steps them and looks at what must hold. [`throw`] draws short threads that meet shapes of all kinds.
+//! Scenes made by a generator, for properties that must hold of every one: [`make`] draws them, [`way`] does to them
+//! what must not change the answer, [`play`] steps them and looks at what must hold. [`throw`] draws short threads that
+//! meet shapes of all kinds.
 
 pub mod draw;
 pub mod make;

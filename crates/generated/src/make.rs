@@ -1,12 +1,14 @@
-//! Draws scenes: sensible ones, of threads as they are used, and absurd ones, of numbers that are finite and nothing else.
+//! Draws scenes: sensible ones, of threads as they are used, and absurd ones, of numbers that are finite and nothing
+//! else.
 
 use crate::draw::Draw;
 use crate::scene::{Act, Held, Joined, Reeled, Scene, elements};
 use core::f64::consts::{FRAC_PI_2, TAU};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Along, Closure, Drive, Friction, Geometry, Hold, Integrator, LoadKind, Material, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section,
-    Settings, ShapeMotion, ShapeSpec, Shear, Stretch, WeldRest, transported_frames,
+    Along, Closure, Drive, Friction, Geometry, Hold, Integrator, LoadKind, Material, Place, Plasticity, Pose, Profile,
+    ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Stretch, WeldRest,
+    transported_frames,
 };
 
 /// Which sensible scenes.
@@ -179,12 +181,19 @@ pub fn sensible(d: &mut Draw, kind: Kind) -> Scene {
             (spec.roll, spec.pretwist) = (d.even(0.0, 1.0), d.even(0.0, 3.0));
         }
         if d.chance(0.2) {
-            let profile = |d: &mut Draw, a: f64, b: f64| Profile(vec![(0.0, 1.0), (0.3 * curve.length, d.even(a, b)), (0.9 * curve.length, 1.0)]);
+            let profile = |d: &mut Draw, a: f64, b: f64| {
+                Profile(vec![(0.0, 1.0), (0.3 * curve.length, d.even(a, b)), (0.9 * curve.length, 1.0)])
+            };
             // A size under one: what touches is the largest.
-            spec.along = Along { size: profile(d, 1.0, 0.7), modulus: profile(d, 1.0, 3.0), density: profile(d, 1.0, 2.0) };
+            spec.along =
+                Along { size: profile(d, 1.0, 0.7), modulus: profile(d, 1.0, 3.0), density: profile(d, 1.0, 2.0) };
         }
         if section == Section::Round && d.chance(0.2) {
-            spec.material.plasticity = Some(Plasticity { yield_curvature: d.log(300.0, 50.0), yield_twist: d.log(300.0, 50.0), hardening: d.even(0.0, 0.5) });
+            spec.material.plasticity = Some(Plasticity {
+                yield_curvature: d.log(300.0, 50.0),
+                yield_twist: d.log(300.0, 50.0),
+                hardening: d.even(0.0, 0.5),
+            });
         }
         if !closed && !joined && !passive && d.chance(0.3) {
             (spec.rest, spec.along, spec.roll, spec.pretwist) = (RestShape::Straight, Along::default(), 0.0, 0.0);
@@ -230,8 +239,8 @@ fn ring(length: f64, n: usize) -> Vec<DVec3> {
     (0..=n).map(at).collect()
 }
 
-/// Joins the next thread, `number`, with its start to the end of the one before it, or to its middle where that is straight and far from all else; says
-/// where it begins.
+/// Joins the next thread, `number`, with its start to the end of the one before it, or to its middle where that is
+/// straight and far from all else; says where it begins.
 fn join(d: &mut Draw, scene: &mut Scene, number: usize, touching: bool) -> Option<Pose> {
     let (from, before) = (number - 1, scene.rods.last()?);
     if before.closure.is_some() || scene.reels.iter().any(|r| r.rod == from && r.at_end) {
@@ -239,8 +248,11 @@ fn join(d: &mut Draw, scene: &mut Scene, number: usize, touching: bool) -> Optio
     }
     let (x, n) = (&before.centerline, before.centerline.len() - 1);
     let straight = (x[n] - x[0]).length() > 0.999 * crate::scene::length(before, x);
-    let (place, at, bend) =
-        if straight && !touching && d.chance(0.5) { (Place::Particle(n as u32 / 2), x[n / 2], 1.3) } else { (Place::End, x[n], d.even(0.0, 0.6)) };
+    let (place, at, bend) = if straight && !touching && d.chance(0.5) {
+        (Place::Particle(n as u32 / 2), x[n / 2], 1.3)
+    } else {
+        (Place::End, x[n], d.even(0.0, 0.6))
+    };
     // About the normal of the ground, or any axis across.
     let along = (x[n] - x[n - 1]).normalize();
     let axis = if touching { DVec3::Z } else { along.any_orthonormal_vector() };
@@ -272,7 +284,17 @@ fn reels(d: &mut Draw, scene: &mut Scene, rod: usize, stretch: Stretch) {
 
 /// A grip that holds from the beginning and stays where it is.
 fn still(rod: usize, place: Place, hold: Hold) -> Held {
-    Held { rod, place, hold, drive: Drive::Pose, ramp: 0.0, from: 0, until: u32::MAX, velocity: DVec3::ZERO, spin: DVec3::ZERO }
+    Held {
+        rod,
+        place,
+        hold,
+        drive: Drive::Pose,
+        ramp: 0.0,
+        from: 0,
+        until: u32::MAX,
+        velocity: DVec3::ZERO,
+        spin: DVec3::ZERO,
+    }
 }
 
 /// What holds a thread at its ends, and how it moves.
@@ -281,7 +303,10 @@ fn holds(d: &mut Draw, scene: &mut Scene, rod: usize, spec: &RodSpec, kind: Kind
     let reeled = [false, true].map(|at_end| scene.reels.iter().any(|r| r.rod == rod && r.at_end == at_end));
     let (start, end) = (d.chance(0.7) || reeled[0], d.chance(0.3) && elements(spec) > 3 || reeled[1]);
     // A weld is held as the place of one of its threads only, and a seam once.
-    let places = [(start && !joined(Place::Start), Place::Start, reeled[0]), (end && spec.closure.is_none(), Place::End, reeled[1])];
+    let places = [
+        (start && !joined(Place::Start), Place::Start, reeled[0]),
+        (end && spec.closure.is_none(), Place::End, reeled[1]),
+    ];
     for (_, place, reeled) in places.into_iter().filter(|p| p.0) {
         let hold = [Hold::Pin, Hold::Clamp, Hold::Jaw][d.whole(0, if reeled { 1 } else { 2 }) as usize];
         scene.grips.push(still(rod, place, hold));
@@ -295,7 +320,8 @@ fn holds(d: &mut Draw, scene: &mut Scene, rod: usize, spec: &RodSpec, kind: Kind
         match d.whole(0, 2) {
             0 => (grip.velocity, grip.spin) = (d.vector(0.05), d.vector(2.0)),
             1 => {
-                grip.drive = Drive::Force { direction: d.direction(), force: d.log(1e-3, 0.1), speed_limit: d.log(0.05, 0.2) };
+                grip.drive =
+                    Drive::Force { direction: d.direction(), force: d.log(1e-3, 0.1), speed_limit: d.log(0.05, 0.2) };
             }
             _ => (grip.from, grip.until, grip.ramp) = (frames / 4, frames / 2, 0.02),
         }
@@ -314,7 +340,9 @@ fn loads(d: &mut Draw, scene: &mut Scene, rod: usize, n: u32, passive: bool, rad
     }
     if d.chance(0.2) {
         let mass = d.log(1e-6, 1e-4);
-        scene.loads.push((rod, LoadKind::Mass { place: place(d), mass, inertia: DVec3::splat(mass * radius * radius) }));
+        scene
+            .loads
+            .push((rod, LoadKind::Mass { place: place(d), mass, inertia: DVec3::splat(mass * radius * radius) }));
     }
 }
 
@@ -332,12 +360,23 @@ fn ground(d: &mut Draw, kind: Kind) -> ShapeSpec {
         _ => {
             // A shallow roof of four triangles.
             let (a, b) = (2.0 * size, 0.3 * size);
-            let vertices = vec![DVec3::ZERO, DVec3::new(a, 0.0, -b), DVec3::new(0.0, a, -b), DVec3::new(-a, 0.0, -b), DVec3::new(0.0, -a, -b)];
-            (Geometry::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]] }, Pose::new(DVec3::ZERO, about))
+            let vertices = vec![
+                DVec3::ZERO,
+                DVec3::new(a, 0.0, -b),
+                DVec3::new(0.0, a, -b),
+                DVec3::new(-a, 0.0, -b),
+                DVec3::new(0.0, -a, -b),
+            ];
+            (
+                Geometry::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]] },
+                Pose::new(DVec3::ZERO, about),
+            )
         }
     };
     let motion = match kind {
-        Kind::Worked if d.chance(0.3) => ShapeMotion::Pushed { direction: DVec3::Z, force: d.log(1e-3, 0.1), speed_limit: d.log(0.02, 0.2) },
+        Kind::Worked if d.chance(0.3) => {
+            ShapeMotion::Pushed { direction: DVec3::Z, force: d.log(1e-3, 0.1), speed_limit: d.log(0.02, 0.2) }
+        }
         _ => ShapeMotion::Fixed,
     };
     ShapeSpec { geometry, pose, surface: d.whole(0, 1), motion, open: false }
@@ -397,10 +436,15 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
         3 => rod.material.bend_damping = x,
         4 => rod.material.shear = Shear::Modulus(1e9 * x),
         5 => rod.material.bend_scale = x.min(1.0),
-        6 => rod.material.plasticity = Some(Plasticity { yield_curvature: x, yield_twist: wild(d), hardening: d.even(0.0, 0.999) }),
+        6 => {
+            rod.material.plasticity =
+                Some(Plasticity { yield_curvature: x, yield_twist: wild(d), hardening: d.even(0.0, 0.999) })
+        }
         7 => rod.section = Section::Rectangle([1e-4 * x, 1e-4 * wild(d)]),
         8 => rod.pretwist = x,
-        9 => rod.rest = RestShape::Given { lengths: Some((0..n).map(|_| 1e-3 * d.log(1.0, x)).collect()), darboux: None },
+        9 => {
+            rod.rest = RestShape::Given { lengths: Some((0..n).map(|_| 1e-3 * d.log(1.0, x)).collect()), darboux: None }
+        }
         10 => rod.rest = RestShape::Given { lengths: None, darboux: Some((1..n).map(|_| d.vector(x)).collect()) },
         11 => rod.centerline.iter_mut().for_each(|p| *p *= x),
         12 => {
@@ -431,9 +475,16 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
         23 => scene.settings.friction = Friction { stick: x, slide: x * d.unit() },
         24 => scene.frictions.push((0, 1, Friction::coulomb(x))),
         25 => scene.settings.linear_damping = 1.0 - 1e-16 * x.clamp(1.0, 1e15),
-        26 => scene.loads.push((number, LoadKind::Point { place: Place::Arc(1e-3), force: d.direction() * x, torque: DVec3::ZERO })),
-        27 => scene.loads.push((number, LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: d.direction() * (1e-6 * x) })),
-        28 => scene.loads.push((number, LoadKind::Mass { place: Place::Start, mass: x, inertia: DVec3::splat(wild(d)) })),
+        26 => scene
+            .loads
+            .push((number, LoadKind::Point { place: Place::Arc(1e-3), force: d.direction() * x, torque: DVec3::ZERO })),
+        27 => scene.loads.push((
+            number,
+            LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: d.direction() * (1e-6 * x) },
+        )),
+        28 => {
+            scene.loads.push((number, LoadKind::Mass { place: Place::Start, mass: x, inertia: DVec3::splat(wild(d)) }))
+        }
         29 => {
             for grip in &mut scene.grips {
                 (grip.velocity, grip.spin, grip.drive) = (d.direction() * x, d.direction() * wild(d), Drive::Pose);
@@ -446,12 +497,24 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
             }
         }
         31 => {
-            let geometry = [Geometry::Sphere { radius: 0.01 * x }, Geometry::Box { half_sides: DVec3::new(0.01, 0.01 * x, 0.01) }, Geometry::Plane]
-                [d.whole(0, 2) as usize]
+            let geometry = [
+                Geometry::Sphere { radius: 0.01 * x },
+                Geometry::Box { half_sides: DVec3::new(0.01, 0.01 * x, 0.01) },
+                Geometry::Plane,
+            ][d.whole(0, 2) as usize]
                 .clone();
-            let motion = [ShapeMotion::Driven, ShapeMotion::Pushed { direction: d.direction(), force: wild(d), speed_limit: wild(d) }][d.whole(0, 1) as usize];
+            let motion = [
+                ShapeMotion::Driven,
+                ShapeMotion::Pushed { direction: d.direction(), force: wild(d), speed_limit: wild(d) },
+            ][d.whole(0, 1) as usize];
             let shape = scene.shapes.len();
-            scene.shapes.push(ShapeSpec { geometry, pose: Pose::new(d.vector(0.02), d.turn()), surface: 1, motion, open: false });
+            scene.shapes.push(ShapeSpec {
+                geometry,
+                pose: Pose::new(d.vector(0.02), d.turn()),
+                surface: 1,
+                motion,
+                open: false,
+            });
             scene.acts.push((when, Act::ShapePose(shape, Pose::new(d.vector(x), d.turn()))));
         }
         32 => scene.acts.push((when, if d.chance(0.5) { Act::RemoveRod(number) } else { Act::RemoveShape(0) })),
@@ -460,32 +523,48 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
             scene.acts.push((when, Act::InsertRod(spec)));
         }
         34 => {
-            let other = Settings { gravity: d.vector(x), substep: scene.settings.substep * d.log(0.3, 30.0), ..scene.settings.clone() };
+            let other = Settings {
+                gravity: d.vector(x),
+                substep: scene.settings.substep * d.log(0.3, 30.0),
+                ..scene.settings.clone()
+            };
             scene.acts.push((when, Act::Settings(other)));
         }
         36 => rod.closure = if d.chance(0.5) { None } else { Some(Closure { twist: d.signed() * x }) },
         37 => {
-            let spec = RodSpec { along: Along::default(), roll: 0.0, pretwist: 0.0, rest: RestShape::Straight, ..rod.clone() };
+            let spec =
+                RodSpec { along: Along::default(), roll: 0.0, pretwist: 0.0, rest: RestShape::Straight, ..rod.clone() };
             *rod = spec;
             let law = if d.chance(0.5) { ReelLaw::Rate(d.signed() * x.min(100.0)) } else { ReelLaw::Brake(x) };
-            let later = Some((when, if d.chance(0.5) { ReelLaw::Rate(-x.min(100.0)) } else { ReelLaw::Brake(wild(d)) }));
+            let later =
+                Some((when, if d.chance(0.5) { ReelLaw::Rate(-x.min(100.0)) } else { ReelLaw::Brake(wild(d)) }));
             scene.reels.push(Reeled { rod: number, at_end: d.chance(0.5), law, later, supply: Some(d.even(3.0, 0.0)) });
         }
         38 => {
             for reel in &mut scene.reels {
-                reel.law = if d.chance(0.5) { ReelLaw::Rate(d.signed() * wild(d).min(100.0)) } else { ReelLaw::Brake(wild(d)) };
+                reel.law = if d.chance(0.5) {
+                    ReelLaw::Rate(d.signed() * wild(d).min(100.0))
+                } else {
+                    ReelLaw::Brake(wild(d))
+                };
             }
         }
         // A thread onto itself, its twin, or another one, wherever they lie.
         39 => {
             let other = d.whole(0, n_rods as u32 - 1) as usize;
-            let place = |d: &mut Draw| [Place::Start, Place::End, Place::Particle(n as u32 / 2), Place::Particle(1)][d.whole(0, 3) as usize];
+            let place = |d: &mut Draw| {
+                [Place::Start, Place::End, Place::Particle(n as u32 / 2), Place::Particle(1)][d.whole(0, 3) as usize]
+            };
             let places = vec![(number, place(d)), (other, place(d))];
             let shift = scene.rods[number].centerline[0] - scene.rods[other].centerline[0];
             if d.chance(0.7) {
                 scene.rods[other].centerline.iter_mut().for_each(|p| *p += shift);
             }
-            scene.welds.push(Joined { places, rest: if d.chance(0.5) { WeldRest::Straight } else { WeldRest::AsInserted }, until: when });
+            scene.welds.push(Joined {
+                places,
+                rest: if d.chance(0.5) { WeldRest::Straight } else { WeldRest::AsInserted },
+                until: when,
+            });
         }
         40 => scene.welds.iter_mut().for_each(|w| w.until = when),
         41 => scene.settings.integrator = Integrator::TrBdf2,
@@ -496,7 +575,14 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
                 1 => Act::GripPose(0, Pose::new(d.vector(x), d.turn())),
                 2 => {
                     let Material { young_modulus, density, .. } = rod.material;
-                    Act::Material(number, Material { young_modulus: young_modulus * x, density: density * wild(d), ..rod.material.clone() })
+                    Act::Material(
+                        number,
+                        Material {
+                            young_modulus: young_modulus * x,
+                            density: density * wild(d),
+                            ..rod.material.clone()
+                        },
+                    )
                 }
                 _ => Act::Stretch(number, if d.chance(0.5) { Stretch::Elastic } else { Stretch::Inextensible }),
             };

@@ -16,8 +16,8 @@ fn halves([a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     [[a, b, c], [a, c, d]]
 }
 
-/// A profile (radius, height) that has the material on its left, turned about z in `n` pieces; `closed`: its end is joined to its start. No
-/// point of it is on the axis.
+/// A profile (radius, height) that has the material on its left, turned about z in `n` pieces; `closed`: its end is
+/// joined to its start. No point of it is on the axis.
 fn turned(profile: &[(f64, f64)], closed: bool, n: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let m = profile.len() as u32;
     let at = |i: u32, (r, z): (f64, f64)| {
@@ -82,7 +82,11 @@ pub fn torus(major: f64, minor: f64, n: u32, around: u32) -> Geometry {
 /// Two walls that face each other across z, each a box of this thickness or, without any, a sheet.
 pub fn slot(half_gap: f64, thickness: f64, half: f64) -> Geometry {
     let wall = |sign: f64| {
-        let plain = if thickness > 0.0 { cuboid(DVec3::new(half, half, 0.5 * thickness)) } else { sheet(half, half, 1, 1, 0.0) };
+        let plain = if thickness > 0.0 {
+            cuboid(DVec3::new(half, half, 0.5 * thickness))
+        } else {
+            sheet(half, half, 1, 1, 0.0)
+        };
         let turn = if sign < 0.0 { sutura::glam::DQuat::from_rotation_x(PI) } else { sutura::glam::DQuat::IDENTITY };
         moved(plain, |v| turn * v + DVec3::Z * (sign * (half_gap + 0.5 * thickness)))
     };
@@ -113,7 +117,10 @@ fn moved(geometry: Geometry, by: impl Fn(DVec3) -> DVec3) -> Geometry {
 }
 
 fn joined(a: Geometry, b: Geometry) -> Geometry {
-    let (Geometry::Mesh { mut vertices, mut triangles }, Geometry::Mesh { vertices: more, triangles: faces }) = (a, b) else { unreachable!("both are meshes") };
+    let (Geometry::Mesh { mut vertices, mut triangles }, Geometry::Mesh { vertices: more, triangles: faces }) = (a, b)
+    else {
+        unreachable!("both are meshes")
+    };
     let n = vertices.len() as u32;
     vertices.extend(more);
     triangles.extend(faces.into_iter().map(|t| t.map(|v| v + n)));

@@ -1,5 +1,6 @@
-//! Distances by trying everything: from each point of a thread to a solid or to every triangle of a mesh. Slow, short, and not shared with
-//! anything that it is to judge: it says whether a start is free of overlap and whether a held place has room.
+//! Distances by trying everything: from each point of a thread to a solid or to every triangle of a mesh. Slow, short,
+//! and not shared with anything that it is to judge: it says whether a start is free of overlap and whether a held
+//! place has room.
 
 use sutura::glam::DVec3;
 use sutura::{Geometry, Pose};
@@ -10,13 +11,17 @@ pub fn point(geometry: &Geometry, p: DVec3) -> f64 {
     match geometry {
         Geometry::Plane => p.z,
         Geometry::Sphere { radius } => p.length() - radius,
-        Geometry::Capsule { radius, half_length } => p.distance(DVec3::Z * p.z.clamp(-half_length, *half_length)) - radius,
+        Geometry::Capsule { radius, half_length } => {
+            p.distance(DVec3::Z * p.z.clamp(-half_length, *half_length)) - radius
+        }
         Geometry::Cylinder { radius, half_length } => {
             let (side, cap) = (p.x.hypot(p.y) - radius, p.z.abs() - half_length);
             side.max(0.0).hypot(cap.max(0.0)) + side.max(cap).min(0.0)
         }
         Geometry::Box { half_sides } => inner_and_outer(p.abs() - *half_sides),
-        Geometry::Mesh { vertices, triangles } => triangles.iter().map(|t| triangle(p, t.map(|v| vertices[v as usize]))).fold(f64::INFINITY, f64::min),
+        Geometry::Mesh { vertices, triangles } => {
+            triangles.iter().map(|t| triangle(p, t.map(|v| vertices[v as usize]))).fold(f64::INFINITY, f64::min)
+        }
     }
 }
 
@@ -77,7 +82,12 @@ mod tests {
     fn a_mesh_of_a_box_is_as_near_as_the_box() {
         let half = DVec3::new(1.0, 2.0, 0.5);
         let (solid, surface) = (Geometry::Box { half_sides: half }, mesh::cuboid(half));
-        for p in [DVec3::new(3.0, 0.1, 0.2), DVec3::new(1.5, 2.5, 0.9), DVec3::new(-0.3, 0.4, 0.7), DVec3::new(0.2, -1.9, 0.1)] {
+        for p in [
+            DVec3::new(3.0, 0.1, 0.2),
+            DVec3::new(1.5, 2.5, 0.9),
+            DVec3::new(-0.3, 0.4, 0.7),
+            DVec3::new(0.2, -1.9, 0.1),
+        ] {
             assert!((point(&solid, p).abs() - point(&surface, p)).abs() < 1e-12, "{p}");
         }
     }

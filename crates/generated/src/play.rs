@@ -7,8 +7,8 @@ use sutura::glam::DVec3;
 use sutura::input::Recorder;
 use sutura::math::exp;
 use sutura::{
-    Drive, Error, Grip, GripSpec, Handle, IncidentKind, Integrator, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, StepReport,
-    Stretch, View, Weld, WeldSpec, World,
+    Drive, Error, Grip, GripSpec, Handle, IncidentKind, Integrator, Load, LoadKind, LoadSpec, Place, Pose, Reel,
+    ReelSpec, Rod, RodView, Shape, StepReport, Stretch, View, Weld, WeldSpec, World,
 };
 
 /// A scene being played.
@@ -34,12 +34,14 @@ pub struct Player<'a> {
 const STUCK: u32 = 2;
 
 impl<'a> Player<'a> {
-    /// Builds the world; an error when it refuses the settings. `record` says whether it writes down what is done to it.
+    /// Builds the world; an error when it refuses the settings. `record` says whether it writes down what is done to
+    /// it.
     pub fn new(scene: &'a Scene, record: bool) -> Result<Self, Error> {
         let world = Recorder::new(scene.settings.clone(), record)?;
         let grips = vec![None; scene.grips.len()];
         let (rods, shapes, loads, welds, reels) = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut player = Player { scene, world, rods, shapes, loads, welds, reels, grips, frame: 0, stuck: 0, refused: 0 };
+        let mut player =
+            Player { scene, world, rods, shapes, loads, welds, reels, grips, frame: 0, stuck: 0, refused: 0 };
         if scene.other_order {
             player.insert_shapes();
             player.insert_rods();
@@ -70,7 +72,8 @@ impl<'a> Player<'a> {
             self.rods.push(rod);
         }
         for weld in &self.scene.welds {
-            let places: Option<Vec<_>> = weld.places.iter().map(|(rod, place)| Some((self.rod(*rod)?, *place))).collect();
+            let places: Option<Vec<_>> =
+                weld.places.iter().map(|(rod, place)| Some((self.rod(*rod)?, *place))).collect();
             let weld = places.and_then(|places| {
                 let weld = self.world.insert_weld(&WeldSpec { places, rest: weld.rest });
                 self.done(weld)
@@ -80,7 +83,12 @@ impl<'a> Player<'a> {
         for reel in &self.scene.reels {
             let reel = self.rod(reel.rod).and_then(|rod| {
                 let length = self.world.rod(rod).map_or(0.0, |r| r.rest_length());
-                let reel = self.world.insert_reel(&ReelSpec { rod, at_end: reel.at_end, law: reel.law, supply: reel.supply.map(|s| s * length) });
+                let reel = self.world.insert_reel(&ReelSpec {
+                    rod,
+                    at_end: reel.at_end,
+                    law: reel.law,
+                    supply: reel.supply.map(|s| s * length),
+                });
                 self.done(reel)
             });
             self.reels.push(reel);
@@ -119,7 +127,13 @@ impl<'a> Player<'a> {
                 continue;
             }
             let Some(rod) = self.rod(grip.rod) else { continue };
-            let taken = self.world.insert_grip(&GripSpec { rod, place: grip.place, hold: grip.hold, drive: grip.drive, ramp: grip.ramp });
+            let taken = self.world.insert_grip(&GripSpec {
+                rod,
+                place: grip.place,
+                hold: grip.hold,
+                drive: grip.drive,
+                ramp: grip.ramp,
+            });
             if let Some(handle) = self.done(taken)
                 && let Ok(pose) = self.world.grip_pose(handle)
             {
@@ -168,8 +182,12 @@ impl<'a> Player<'a> {
             Act::InsertRod(spec) => Some(self.world.insert_rod(spec).map(|rod| self.rods.push(Some(rod)))),
             Act::Material(i, material) => self.rod(*i).map(|rod| self.world.set_material(rod, material)),
             Act::Stretch(i, stretch) => self.rod(*i).map(|rod| self.world.set_stretch(rod, *stretch)),
-            Act::RemoveShape(i) => self.shapes.get_mut(*i).and_then(Option::take).map(|shape| self.world.remove_shape(shape)),
-            Act::ShapePose(i, pose) => self.shapes.get(*i).copied().flatten().map(|shape| self.world.set_shape_pose(shape, *pose)),
+            Act::RemoveShape(i) => {
+                self.shapes.get_mut(*i).and_then(Option::take).map(|shape| self.world.remove_shape(shape))
+            }
+            Act::ShapePose(i, pose) => {
+                self.shapes.get(*i).copied().flatten().map(|shape| self.world.set_shape_pose(shape, *pose))
+            }
             Act::Settings(settings) => Some(self.world.set_settings(settings.clone())),
             Act::Load(i, kind) => self.loads.get(*i).copied().flatten().map(|load| self.world.set_load(load, *kind)),
             Act::Drive(i, drive) => grip(self, *i).map(|grip| self.world.set_grip_drive(grip, *drive)),
@@ -185,11 +203,14 @@ impl<'a> Player<'a> {
         self.act();
         self.frame += 1;
         let report = self.world.step_with(self.scene.frame, observe);
-        let stuck = report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::Held { .. } | IncidentKind::NotFinite));
+        let stuck = report.incidents.iter().any(|i| {
+            matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::Held { .. } | IncidentKind::NotFinite)
+        });
         self.stuck = if stuck { self.stuck + 1 } else { 0 };
         report
     }
-    /// Whether there are no frames left, or it is stuck for good: each such frame takes all the attempts that the settings allow.
+    /// Whether there are no frames left, or it is stuck for good: each such frame takes all the attempts that the
+    /// settings allow.
     pub fn is_over(&self) -> bool {
         self.frame >= self.scene.frames || self.stuck >= STUCK
     }
@@ -200,7 +221,8 @@ impl<'a> Player<'a> {
         }
         self
     }
-    /// Plays to the end; before each frame for which `split` holds it goes on from a snapshot of itself, without its working memory.
+    /// Plays to the end; before each frame for which `split` holds it goes on from a snapshot of itself, without its
+    /// working memory.
     pub fn play_split(mut self, split: impl Fn(u32) -> bool) -> Result<Self, Error> {
         while !self.is_over() {
             if split(self.frame) {
@@ -257,7 +279,8 @@ pub fn kind(incident: &IncidentKind) -> &'static str {
     }
 }
 
-/// Plays a scene to its end under the eyes of everything that must hold. `audited`: also that nothing passes through anything unsaid.
+/// Plays a scene to its end under the eyes of everything that must hold. `audited`: also that nothing passes through
+/// anything unsaid.
 pub fn watch(scene: &Scene, audited: bool) -> Seen {
     let mut seen = Seen::default();
     let Ok(mut player) = Player::new(scene, false) else {
@@ -280,7 +303,10 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
             }
         });
         if let Some(e) = &mut energies {
-            e.observe(&player.world, report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })));
+            e.observe(
+                &player.world,
+                report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })),
+            );
         }
         seen.frames += 1;
         seen.substeps += u64::from(report.substeps);
@@ -289,7 +315,11 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
             *seen.incidents.entry(kind(&incident.kind)).or_default() += 1;
         }
         seen.fault = fault(&player.world, scene.frame, &report);
-        if seen.fault.is_none() && audited && audit.report().passes_through && !seen.incidents.contains_key("passed through") {
+        if seen.fault.is_none()
+            && audited
+            && audit.report().passes_through
+            && !seen.incidents.contains_key("passed through")
+        {
             seen.fault = Some(format!("passed through unsaid: {:?}", audit.report().crossings.first()));
         }
     }
@@ -301,7 +331,8 @@ pub fn watch(scene: &Scene, audited: bool) -> Seen {
     seen
 }
 
-/// What is wrong after a step, if anything: numbers that are not finite, more work than the settings allow, or not said that it went wrong.
+/// What is wrong after a step, if anything: numbers that are not finite, more work than the settings allow, or not said
+/// that it went wrong.
 fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
     let settings = world.settings();
     let wanted = (dt / settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
@@ -317,7 +348,12 @@ fn fault(world: &World, dt: f64, report: &StepReport) -> Option<String> {
     {
         return Some(format!("more work than the settings allow: {report:?}"));
     }
-    let said = [report.residual, report.length_error, report.thread_clearance.unwrap_or(0.0), report.shape_clearance.unwrap_or(0.0)];
+    let said = [
+        report.residual,
+        report.length_error,
+        report.thread_clearance.unwrap_or(0.0),
+        report.shape_clearance.unwrap_or(0.0),
+    ];
     if !said.iter().all(|v| v.is_finite()) {
         return Some(format!("the report has a number that is not finite: {report:?}"));
     }
@@ -372,7 +408,8 @@ struct Turnover<'a> {
 /// Where nothing moves energy is the rounding of lengths and angles: this part of EI / L counts as turned over.
 const NOTHING: f64 = 1e-9;
 
-/// To how much the engine holds the length of an inextensible element. The work of its tension over that much comes and goes.
+/// To how much the engine holds the length of an inextensible element. The work of its tension over that much comes and
+/// goes.
 const LENGTH_TOLERANCE: f64 = 5e-6;
 
 impl<'a> Turnover<'a> {
@@ -381,9 +418,19 @@ impl<'a> Turnover<'a> {
         let (own, potential) = energy(scene, view);
         let bending: f64 = view.rods().map(|r| r.bending_stiffness(0).min_element() / r.rest_length()).sum();
         let open = open_work(scene, world);
-        Turnover { scene, start: potential, last: own + potential, open, most: own.max(NOTHING * bending), growth: 0.0, time: 0.0, off: false }
+        Turnover {
+            scene,
+            start: potential,
+            last: own + potential,
+            open,
+            most: own.max(NOTHING * bending),
+            growth: 0.0,
+            time: 0.0,
+            off: false,
+        }
     }
-    /// After a step; `off` when the report says that a length was not kept in it: a thread that is to keep its length counts no energy of stretch.
+    /// After a step; `off` when the report says that a length was not kept in it: a thread that is to keep its length
+    /// counts no energy of stretch.
     fn observe(&mut self, world: &World, off: bool) {
         let (own, potential) = energy(self.scene, world.view());
         let (total, open) = (own + potential, open_work(self.scene, world));
@@ -397,15 +444,19 @@ impl<'a> Turnover<'a> {
     }
 }
 
-/// Part of a diameter by which the engine lets things overlap. A contact force works over that much, and this is no energy of a thread.
+/// Part of a diameter by which the engine lets things overlap. A contact force works over that much, and this is no
+/// energy of a thread.
 const OVERLAP: f64 = 0.04;
 
-/// Work of the tensions of inextensible threads over what their lengths may be off, to either side, and of contact forces over the overlap that may be \[J\].
+/// Work of the tensions of inextensible threads over what their lengths may be off, to either side, and of contact
+/// forces over the overlap that may be \[J\].
 fn open_work(scene: &Scene, world: &World) -> f64 {
     let widest = scene.rods.iter().map(|r| r.radius).fold(0.0, f64::max);
     let touching: f64 = world.contacts().map(|c| c.force.length() * 2.0 * widest * OVERLAP).sum();
     let rods = world.view().rods().zip(&scene.rods).filter(|(_, spec)| spec.stretch == Stretch::Inextensible);
-    let of = |rod: &RodView<'_>| rod.rest_lengths().iter().enumerate().map(|(e, l)| rod.tension(e).abs() * l * LENGTH_TOLERANCE).sum::<f64>();
+    let of = |rod: &RodView<'_>| {
+        rod.rest_lengths().iter().enumerate().map(|(e, l)| rod.tension(e).abs() * l * LENGTH_TOLERANCE).sum::<f64>()
+    };
     touching + 2.0 * rods.map(|(rod, _)| of(&rod)).sum::<f64>()
 }
 
@@ -433,7 +484,8 @@ pub fn energy(scene: &Scene, view: View<'_>) -> (f64, f64) {
                 potential -= force.dot(at);
             }
             LoadKind::Uniform { force_per_length } => {
-                let moment: DVec3 = rod.rest_lengths().iter().enumerate().map(|(e, l)| (x[e] + x[e + 1]) * (0.5 * l)).sum();
+                let moment: DVec3 =
+                    rod.rest_lengths().iter().enumerate().map(|(e, l)| (x[e] + x[e + 1]) * (0.5 * l)).sum();
                 potential -= force_per_length.dot(moment);
             }
             // Its weight is in the energy of the thread.

@@ -1,7 +1,9 @@
 //! A scene as data: what is inserted, how grips move, and what is done at which frame.
 
 use sutura::glam::DVec3;
-use sutura::{Drive, Friction, Hold, LoadKind, Material, Place, Pose, ReelLaw, RodSpec, Settings, ShapeSpec, Stretch, WeldRest};
+use sutura::{
+    Drive, Friction, Hold, LoadKind, Material, Place, Pose, ReelLaw, RodSpec, Settings, ShapeSpec, Stretch, WeldRest,
+};
 
 /// A scene.
 #[derive(Debug, Clone)]
@@ -109,7 +111,9 @@ pub enum Act {
 impl Scene {
     /// Whether nothing from outside does work but loads that have a potential: its energy must not grow.
     pub fn is_passive(&self) -> bool {
-        let still = |g: &Held| g.drive == Drive::Pose && g.ramp == 0.0 && g.from == 0 && g.velocity == DVec3::ZERO && g.spin == DVec3::ZERO;
+        let still = |g: &Held| {
+            g.drive == Drive::Pose && g.ramp == 0.0 && g.from == 0 && g.velocity == DVec3::ZERO && g.spin == DVec3::ZERO
+        };
         let potential = |kind: &LoadKind| !matches!(kind, LoadKind::Point { torque, .. } if *torque != DVec3::ZERO);
         let fixed = |s: &ShapeSpec| s.motion == sutura::ShapeMotion::Fixed;
         let ever = |w: &Joined| w.until == u32::MAX;

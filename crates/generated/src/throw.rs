@@ -1,6 +1,6 @@
-//! Throws: a short thread at, over, through or inside one shape, drawn so that it begins free of overlap and that there is always a way to go on
-//! without one: what is driven by pose meets threads that give way, and no force presses deeper than a thread can be pressed. So no throw
-//! has a reason for a passage or an incident.
+//! Throws: a short thread at, over, through or inside one shape, drawn so that it begins free of overlap and that there
+//! is always a way to go on without one: what is driven by pose meets threads that give way, and no force presses
+//! deeper than a thread can be pressed. So no throw has a reason for a passage or an incident.
 
 use crate::draw::Draw;
 use crate::mesh;
@@ -9,7 +9,10 @@ use crate::scene::{Act, Held, Scene};
 use core::f64::consts::PI;
 use sutura::glam::{DQuat, DVec3};
 use sutura::math::exp;
-use sutura::{Drive, Friction, Geometry, Hold, LoadKind, Material, Place, Pose, RodSpec, Settings, ShapeMotion, ShapeSpec, Shear, Stretch, transported_frames};
+use sutura::{
+    Drive, Friction, Geometry, Hold, LoadKind, Material, Place, Pose, RodSpec, Settings, ShapeMotion, ShapeSpec, Shear,
+    Stretch, transported_frames,
+};
 
 /// What the thread meets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -129,7 +132,8 @@ struct Thread {
     material: Material,
 }
 
-/// Part of its axial stiffness that a force on a thread may reach: it then stretches by as much, and is pressed in by a fifth of its radius.
+/// Part of its axial stiffness that a force on a thread may reach: it then stretches by as much, and is pressed in by a
+/// fifth of its radius.
 const MOST_STRAIN: f64 = 0.05;
 
 impl Thread {
@@ -227,7 +231,11 @@ fn target(d: &mut Draw, family: Family, radius: f64, length: f64) -> Target {
         }
         Family::Wire => {
             let (thick, half_length) = (d.log(5e-5, 2e-3), d.even(5e-3, 2e-2));
-            let geometry = if d.chance(0.5) { Geometry::Capsule { radius: thick, half_length } } else { Geometry::Cylinder { radius: thick, half_length } };
+            let geometry = if d.chance(0.5) {
+                Geometry::Capsule { radius: thick, half_length }
+            } else {
+                Geometry::Cylinder { radius: thick, half_length }
+            };
             let side = if d.chance(0.2) { DVec3::Z } else { across(d, DVec3::Z) };
             let (toward, aim) = (tilted(d, side, 0.4), DVec3::Z * (d.signed() * 0.6 * half_length));
             outside(d, geometry, toward, aim)
@@ -280,7 +288,8 @@ fn target(d: &mut Draw, family: Family, radius: f64, length: f64) -> Target {
                 let (toward, aim) = (d.direction(), across(d, DVec3::Z) * major);
                 return outside(d, geometry, toward, aim);
             }
-            let off = across(d, DVec3::Z) * d.even(0.0, 0.3 * (major - minor - radius)) + DVec3::Z * (d.signed() * 0.3 * length);
+            let off = across(d, DVec3::Z) * d.even(0.0, 0.3 * (major - minor - radius))
+                + DVec3::Z * (d.signed() * 0.3 * length);
             Target { geometry, toward: d.direction(), aim: off, along: tilted(d, DVec3::Z, 0.3), inside: true }
         }
         Family::Slot => {
@@ -289,7 +298,11 @@ fn target(d: &mut Draw, family: Family, radius: f64, length: f64) -> Target {
             let geometry = mesh::slot(half_gap, thickness, length * d.log(0.2, 1.0));
             let along = DQuat::from_rotation_z(d.even(0.0, 2.0 * PI)) * DVec3::X;
             let toward = if d.chance(0.7) { DVec3::Z } else { d.direction() };
-            let off = DVec3::new(d.signed() * 0.2 * length, d.signed() * 0.2 * length, d.signed() * 0.5 * (half_gap - radius));
+            let off = DVec3::new(
+                d.signed() * 0.2 * length,
+                d.signed() * 0.2 * length,
+                d.signed() * 0.5 * (half_gap - radius),
+            );
             Target { geometry, toward, aim: off, along, inside: true }
         }
         Family::Sheet => {
@@ -336,8 +349,8 @@ const MOST_DRAWS: u32 = 10_000;
 const ROOM: f64 = 0.3;
 /// Least distance of points half a radius apart, in radii: between them it is less by a quarter at most.
 const CLEAR: f64 = 1.27;
-/// Part of its length that the middle of a thread held at both ends may be carried off by pose, and the modulus of those that bear it \[Pa\]: it is
-/// then longer by a quarter, and pressed in by a third of its radius.
+/// Part of its length that the middle of a thread held at both ends may be carried off by pose, and the modulus of
+/// those that bear it \[Pa\]: it is then longer by a quarter, and pressed in by a third of its radius.
 const CARRIED: f64 = 0.35;
 const SOFT: (f64, f64) = (1e7, 1e8);
 
@@ -361,7 +374,17 @@ fn empty(settings: Settings, frame: f64, frames: u32) -> Scene {
 }
 
 fn held(rod: usize, place: Place, drive: Drive) -> Held {
-    Held { rod, place, hold: Hold::Pin, drive, ramp: 0.0, from: 0, until: u32::MAX, velocity: DVec3::ZERO, spin: DVec3::ZERO }
+    Held {
+        rod,
+        place,
+        hold: Hold::Pin,
+        drive,
+        ramp: 0.0,
+        from: 0,
+        until: u32::MAX,
+        velocity: DVec3::ZERO,
+        spin: DVec3::ZERO,
+    }
 }
 
 /// What holds a thread that is met, beside what it is led by.
@@ -417,7 +440,8 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
     let time = d.even(0.05, 0.3);
     let frames = (time / frame).ceil() as u32;
     // What is driven against a thread held at both ends stops before that bears no more.
-    let moving = if taut && how == How::Driven { frames.min((CARRIED * length / (speed * frame)) as u32) } else { frames };
+    let moving =
+        if taut && how == How::Driven { frames.min((CARRIED * length / (speed * frame)) as u32) } else { frames };
     if moving == 0 {
         return None;
     }
@@ -462,7 +486,11 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
     let mut passive_from = None;
     let outward = [x[0] - x[1], x[thread.n()] - x[thread.n() - 1]].map(DVec3::normalize);
     // A hand that gives way when what it holds is carried off.
-    let hand = |d: &mut Draw, direction: DVec3, fastest: f64| Drive::Hand { direction, force: thread.force(d), speed_limit: fastest.max(0.05) };
+    let hand = |d: &mut Draw, direction: DVec3, fastest: f64| Drive::Hand {
+        direction,
+        force: thread.force(d),
+        speed_limit: fastest.max(0.05),
+    };
     match how {
         How::Driven => {
             velocity = tilted(d, toward, 0.3) * speed;
@@ -504,7 +532,11 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
             passive_from = weights.then_some(0);
         }
         How::Led => {
-            let direction = if t.inside && matches!(family, Family::Tube | Family::Ring | Family::Slot) { outward[1] } else { -toward };
+            let direction = if t.inside && matches!(family, Family::Tube | Family::Ring | Family::Slot) {
+                outward[1]
+            } else {
+                -toward
+            };
             let grip = Held { velocity: tilted(d, direction, 0.2) * speed, ..held(0, Place::End, Drive::Pose) };
             scene.grips.push(grip);
         }
@@ -522,7 +554,9 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
                 return None;
             }
         }
-        if how == How::Pushed && near::shape(&t.geometry, &pose, &near::samples(&[at, at - toward * travel], radius)) < 2.0 * radius {
+        if how == How::Pushed
+            && near::shape(&t.geometry, &pose, &near::samples(&[at, at - toward * travel], radius)) < 2.0 * radius
+        {
             return None;
         }
     }
@@ -531,9 +565,17 @@ fn at_shape(d: &mut Draw, family: Family) -> Option<Throw> {
 }
 
 /// Brings a thread from afar against `toward` until it is this near. `None` where it goes by.
-fn approach(thread: &Thread, place: &mut Pose, spacing: f64, toward: DVec3, wanted: f64, distance: impl Fn(&[DVec3]) -> f64) -> Option<()> {
+fn approach(
+    thread: &Thread,
+    place: &mut Pose,
+    spacing: f64,
+    toward: DVec3,
+    wanted: f64,
+    distance: impl Fn(&[DVec3]) -> f64,
+) -> Option<()> {
     let start = place.position;
-    let mut x: Vec<DVec3> = near::samples(&thread.points, spacing).into_iter().map(|p| place.transform_point(p)).collect();
+    let mut x: Vec<DVec3> =
+        near::samples(&thread.points, spacing).into_iter().map(|p| place.transform_point(p)).collect();
     for _ in 0..200 {
         // No step of this length can overlap.
         let room = distance(&x) - wanted;
@@ -571,7 +613,10 @@ fn of_threads(d: &mut Draw) -> Option<Throw> {
     }
     let gravity = if d.chance(0.5) { DVec3::ZERO } else { toward * -9.81 };
     let mut scene = empty(settings(d, gravity), frame, frames);
-    scene.rods = vec![a.spec(&place, Stretch::Elastic), b.spec(&still, if d.chance(0.2) { Stretch::Inextensible } else { Stretch::Elastic })];
+    scene.rods = vec![
+        a.spec(&place, Stretch::Elastic),
+        b.spec(&still, if d.chance(0.2) { Stretch::Inextensible } else { Stretch::Elastic }),
+    ];
     // The one that is met gives way at the hands that hold it, or at its free end.
     let bears = |d: &mut Draw| a.force(d).min(b.force(d));
     let mut passive_from = None;
@@ -591,7 +636,11 @@ fn of_threads(d: &mut Draw) -> Option<Throw> {
         How::Pulled => {
             let force = bears(d);
             for place in [Place::Start, Place::End] {
-                scene.grips.push(held(0, place, Drive::Hand { direction: -toward, force, speed_limit: speed.max(0.05) }));
+                scene.grips.push(held(
+                    0,
+                    place,
+                    Drive::Hand { direction: -toward, force, speed_limit: speed.max(0.05) },
+                ));
             }
         }
         _ => scene.grips.push(Held { velocity: -toward * speed, ..held(0, Place::End, Drive::Pose) }),
@@ -599,7 +648,9 @@ fn of_threads(d: &mut Draw) -> Option<Throw> {
     // A place that is led stays clear of one that is held by pose.
     let led = place.transform_point(a.points[a.n()]);
     let clear = 3.0 * (a.radius + b.radius);
-    if how == How::Led && near::samples(&[led, led - toward * (speed * time)], clear).iter().any(|p| p.distance(line[0]) < 3.0 * clear) {
+    if how == How::Led
+        && near::samples(&[led, led - toward * (speed * time)], clear).iter().any(|p| p.distance(line[0]) < 3.0 * clear)
+    {
         return None;
     }
     Some(Throw { family: Family::Threads, how, scene, passive_from })

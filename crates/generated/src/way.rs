@@ -3,7 +3,8 @@
 use sutura::glam::{DQuat, DVec3};
 use sutura::math::exp;
 use sutura::{
-    Along, Closure, Drive, Geometry, LoadKind, Material, Place, Pose, Profile, ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec,
+    Along, Closure, Drive, Geometry, LoadKind, Material, Place, Pose, Profile, ReelLaw, RestShape, RodSpec, Section,
+    Settings, ShapeMotion, ShapeSpec,
 };
 
 use crate::scene::{Held, Joined, Reeled, Scene, elements};
@@ -17,7 +18,8 @@ pub struct Way {
     pub mirror: bool,
     /// Particles numbered from the other end.
     pub reversed: bool,
-    /// Lengths and times times this, stresses and densities as they are: forces grow by its square, torques by its cube, gravity falls by it.
+    /// Lengths and times times this, stresses and densities as they are: forces grow by its square, torques by its
+    /// cube, gravity falls by it.
     pub scale: f64,
 }
 
@@ -96,13 +98,18 @@ impl Way {
             _ => crate::scene::length(rod, &centerline),
         };
         let profile = |p: &Profile| {
-            let mut points: Vec<(f64, f64)> = p.0.iter().map(|(arc, v)| if self.reversed { (length - arc * s, *v) } else { (arc * s, *v) }).collect();
+            let mut points: Vec<(f64, f64)> =
+                p.0.iter().map(|(arc, v)| if self.reversed { (length - arc * s, *v) } else { (arc * s, *v) }).collect();
             if self.reversed {
                 points.reverse();
             }
             Profile(points)
         };
-        let along = Along { size: profile(&rod.along.size), modulus: profile(&rod.along.modulus), density: profile(&rod.along.density) };
+        let along = Along {
+            size: profile(&rod.along.size),
+            modulus: profile(&rod.along.modulus),
+            density: profile(&rod.along.density),
+        };
         if self.reversed {
             centerline.reverse();
             // A seam stays where it is.
@@ -127,7 +134,11 @@ impl Way {
                 });
             }
         }
-        let plasticity = rod.material.plasticity.map(|p| sutura::Plasticity { yield_curvature: p.yield_curvature / s, yield_twist: p.yield_twist / s, ..p });
+        let plasticity = rod.material.plasticity.map(|p| sutura::Plasticity {
+            yield_curvature: p.yield_curvature / s,
+            yield_twist: p.yield_twist / s,
+            ..p
+        });
         let material = Material { bend_damping: rod.material.bend_damping * s, plasticity, ..rod.material.clone() };
         let section = match rod.section {
             Section::Round => Section::Round,
@@ -154,8 +165,12 @@ impl Way {
         let geometry = match &shape.geometry {
             Geometry::Plane => Geometry::Plane,
             Geometry::Sphere { radius } => Geometry::Sphere { radius: radius * s },
-            Geometry::Capsule { radius, half_length } => Geometry::Capsule { radius: radius * s, half_length: half_length * s },
-            Geometry::Cylinder { radius, half_length } => Geometry::Cylinder { radius: radius * s, half_length: half_length * s },
+            Geometry::Capsule { radius, half_length } => {
+                Geometry::Capsule { radius: radius * s, half_length: half_length * s }
+            }
+            Geometry::Cylinder { radius, half_length } => {
+                Geometry::Cylinder { radius: radius * s, half_length: half_length * s }
+            }
             Geometry::Box { half_sides } => Geometry::Box { half_sides: *half_sides * s },
             Geometry::Mesh { vertices, triangles } => Geometry::Mesh {
                 vertices: vertices.iter().map(|v| if self.mirror { reflect(*v) } else { *v } * s).collect(),
@@ -174,21 +189,31 @@ impl Way {
     fn load(&self, kind: &LoadKind, n: u32) -> LoadKind {
         let s = self.scale;
         match *kind {
-            LoadKind::Point { place, force, torque } => {
-                LoadKind::Point { place: self.place(place, n), force: self.direction(force) * (s * s), torque: self.axial(torque) * (s * s * s) }
+            LoadKind::Point { place, force, torque } => LoadKind::Point {
+                place: self.place(place, n),
+                force: self.direction(force) * (s * s),
+                torque: self.axial(torque) * (s * s * s),
+            },
+            LoadKind::Uniform { force_per_length } => {
+                LoadKind::Uniform { force_per_length: self.direction(force_per_length) * s }
             }
-            LoadKind::Uniform { force_per_length } => LoadKind::Uniform { force_per_length: self.direction(force_per_length) * s },
-            LoadKind::Mass { place, mass, inertia } => {
-                LoadKind::Mass { place: self.place(place, n), mass: mass * (s * s * s), inertia: inertia * (s * s * s * s * s) }
-            }
+            LoadKind::Mass { place, mass, inertia } => LoadKind::Mass {
+                place: self.place(place, n),
+                mass: mass * (s * s * s),
+                inertia: inertia * (s * s * s * s * s),
+            },
         }
     }
 
     fn grip(&self, grip: &Held, n: u32) -> Held {
         let s = self.scale;
         let drive = match grip.drive {
-            Drive::Force { direction, force, speed_limit } => Drive::Force { direction: self.direction(direction), force: force * s * s, speed_limit },
-            Drive::Hand { direction, force, speed_limit } => Drive::Hand { direction: self.direction(direction), force: force * s * s, speed_limit },
+            Drive::Force { direction, force, speed_limit } => {
+                Drive::Force { direction: self.direction(direction), force: force * s * s, speed_limit }
+            }
+            Drive::Hand { direction, force, speed_limit } => {
+                Drive::Hand { direction: self.direction(direction), force: force * s * s, speed_limit }
+            }
             Drive::Pose => Drive::Pose,
         };
         Held {
@@ -230,7 +255,10 @@ impl Way {
     pub fn scene(&self, scene: &Scene) -> Scene {
         assert!(scene.acts.is_empty(), "acts are not transformed");
         let n = |rod: usize| elements(&scene.rods[rod]);
-        let weld = |w: &Joined| Joined { places: w.places.iter().map(|(rod, place)| (*rod, self.place(*place, n(*rod)))).collect(), ..w.clone() };
+        let weld = |w: &Joined| Joined {
+            places: w.places.iter().map(|(rod, place)| (*rod, self.place(*place, n(*rod)))).collect(),
+            ..w.clone()
+        };
         Scene {
             settings: self.settings(&scene.settings),
             rods: scene.rods.iter().map(|r| self.rod(r)).collect(),

@@ -1,5 +1,5 @@
-//! What must hold of every scene that the generator makes, and what must not change an answer. `PROPTEST_CASES` and `PROPTEST_RNG_SEED`
-//! ask for more cases and for others; `studies robustness` runs thousands.
+//! What must hold of every scene that the generator makes, and what must not change an answer. `PROPTEST_CASES` and
+//! `PROPTEST_RNG_SEED` ask for more cases and for others; `studies robustness` runs thousands.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -59,8 +59,8 @@ fn off(scene: &Scene, way: &Way, frames: u32) -> f64 {
     apart(&positions(scene, frames), &back, scene.length())
 }
 
-/// How far it ends from there when its particles begin elsewhere by 1e-10 of its length: motions may be unstable, and then whatever is
-/// rounded otherwise takes them apart. At least 1e-8.
+/// How far it ends from there when its particles begin elsewhere by 1e-10 of its length: motions may be unstable, and
+/// then whatever is rounded otherwise takes them apart. At least 1e-8.
 fn sensitivity(scene: &Scene, frames: u32) -> f64 {
     let plain = positions(scene, frames);
     let moved = |number: u64| {
@@ -119,8 +119,8 @@ proptest! {
         prop_assert_eq!(off(&scene, &Way { mirror: true, ..Way::default() }, scene.frames), 0.0);
     }
 
-    /// Four times as large, or a quarter: every number, roots among them, has another exponent and the same digits, where no power of a damping
-    /// is taken.
+    /// Four times as large, or a quarter: every number, roots among them, has another exponent and the same digits,
+    /// where no power of a damping is taken.
     #[test]
     fn scaled_by_four_to_the_bit(numbers in numbers(), kind in kinds(), small in any::<bool>()) {
         let mut scene = sensible(numbers, kind);
@@ -129,8 +129,8 @@ proptest! {
         prop_assert_eq!(off(&scene, &Way { scale, ..Way::default() }, scene.frames), 0.0);
     }
 
-    /// What rounds otherwise is off by no more than a thread that begins elsewhere by 1e-10 of its length. Where a ring of strip snaps, one Newton step
-    /// more or less tells, so it must go to its end here too.
+    /// What rounds otherwise is off by no more than a thread that begins elsewhere by 1e-10 of its length. Where a ring
+    /// of strip snaps, one Newton step more or less tells, so it must go to its end here too.
     #[test]
     fn turned_and_rescaled_to_rounding(numbers in numbers()) {
         let mut scene = sensible(numbers, Kind::Free);
@@ -147,7 +147,8 @@ proptest! {
         }
     }
 
-    /// From the other end Newton takes other steps, so it must go to its end: with a tolerance of 1e-9 rad both end at the same place.
+    /// From the other end Newton takes other steps, so it must go to its end: with a tolerance of 1e-9 rad both end at
+    /// the same place.
     #[test]
     fn numbered_from_the_other_end_to_the_tolerance(numbers in numbers()) {
         let mut scene = sensible(numbers, Kind::Free);
@@ -158,7 +159,8 @@ proptest! {
         prop_assert!(off <= allowed, "{:e} for {:e}", off, allowed);
     }
 
-    /// Nothing from outside: from step to step energy does not grow, contacts and friction included, whatever the integrator.
+    /// Nothing from outside: from step to step energy does not grow, contacts and friction included, whatever the
+    /// integrator.
     #[test]
     fn energy_does_not_grow(numbers in numbers(), touching in any::<bool>(), second_order in any::<bool>()) {
         let mut scene = sensible(numbers, if touching { Kind::Touching } else { Kind::FreePassive });
@@ -184,8 +186,8 @@ proptest! {
 /// Part of the energy turned over by which it may grow in a step: what a substep that comes to rest may be left with.
 const GROWTH: f64 = 1e-8;
 
-/// Twice the elements, a quarter of the error; half the substep, half of it. Single threads may pass through zero, so it is the middle one of
-/// many that is judged.
+/// Twice the elements, a quarter of the error; half the substep, half of it. Single threads may pass through zero, so
+/// it is the middle one of many that is judged.
 #[test]
 fn refined_at_the_order_of_the_method() {
     let h = 1.0 / 960.0;
@@ -218,5 +220,9 @@ fn the_same_bits_on_any_number_of_threads() {
         running.into_iter().map(|r| r.join().unwrap()).collect()
     });
     assert_eq!(one, many);
-    assert_eq!(one.iter().collect::<std::collections::BTreeSet<_>>().len(), one.len(), "different scenes end in different states");
+    assert_eq!(
+        one.iter().collect::<std::collections::BTreeSet<_>>().len(),
+        one.len(),
+        "different scenes end in different states"
+    );
 }

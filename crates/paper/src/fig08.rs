@@ -1,6 +1,10 @@
-//! Row E-8, figure 8: a thread of 40 elements, pressed together by 5 cm and turned once, by every method; and what each costs at what error.
+//! Row E-8, figure 8: a thread of 40 elements, pressed together by 5 cm and turned once, by every method; and what each
+//! costs at what error.
 
-use crate::measure::{EFFECTIVE, FRAME, GRAVITY, LENGTH, apart_about_x, at_arc, level, mm, number, out_of_plane, percent, play, sane, scene, thread};
+use crate::measure::{
+    EFFECTIVE, FRAME, GRAVITY, LENGTH, apart_about_x, at_arc, level, mm, number, out_of_plane, percent, play, sane,
+    scene, thread,
+};
 use crate::method::{Direct, Method};
 use crate::outcome::{Axis, Check, Compare, Outcome, Panel, Picture, Plot, Table, Tube};
 use crate::plan::{Experiment, Plan};
@@ -9,8 +13,12 @@ use sutura::glam::{DQuat, DVec3};
 use sutura::{PaperSettings, SweepOrder};
 use sutura_rivals::{Hold, Pose, Scene, der, pbd, pber};
 
-pub const EXPERIMENT: Experiment =
-    Experiment { name: "fig8", title: "Bending and twist coupled: both ends moved 5 cm and turned 360 degrees", figures: "8", plan };
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "fig8",
+    title: "Bending and twist coupled: both ends moved 5 cm and turned 360 degrees",
+    figures: "8",
+    plan,
+};
 
 /// Elements of the published thread.
 const N: usize = 40;
@@ -93,7 +101,12 @@ fn numbers() -> PaperSettings {
 }
 
 fn pber(iterations: usize, substeps: usize) -> Method {
-    Method::Pber(pber::Settings { substeps, iterations, bend_twist: DVec3::new(0.05, 0.05, 0.05 / 1.4), ..Default::default() })
+    Method::Pber(pber::Settings {
+        substeps,
+        iterations,
+        bend_twist: DVec3::new(0.05, 0.05, 0.05 / 1.4),
+        ..Default::default()
+    })
 }
 
 fn pbd(iterations: usize, substeps: usize) -> Method {
@@ -105,22 +118,44 @@ fn plan() -> Plan {
     let mut cases = Vec::new();
     for (gravity, full) in [(NUDGE, false), (weak(), false), (GRAVITY, true)] {
         cases.push(case(der(4), 320, gravity, Role::Converged));
-        let one_each = [paper(20, 1), Method::Paper(PaperSettings::default(), 1), pber(20, 1), pber(80, 1), pbd(20, 1), direct(4), der(1)];
+        let one_each = [
+            paper(20, 1),
+            Method::Paper(PaperSettings::default(), 1),
+            pber(20, 1),
+            pber(80, 1),
+            pbd(20, 1),
+            direct(4),
+            der(1),
+        ];
         cases.extend(one_each.into_iter().map(|m| case(m, N, gravity, Role::Figure)));
         let two_color = PaperSettings { order: SweepOrder::TwoColor, ..numbers() };
         cases.push(case(Method::Paper(two_color, 1), N, gravity, Role::Figure));
-        // At true scale one step a frame is too long for the position-based methods; with ten the step is that of the effective scale.
+        // At true scale one step a frame is too long for the position-based methods; with ten the step is that of the
+        // effective scale.
         if full {
-            cases.extend([paper(20, 10), pber(80, 10), pbd(20, 10)].into_iter().map(|m| case(m, N, gravity, Role::Figure)));
+            cases.extend(
+                [paper(20, 10), pber(80, 10), pbd(20, 10)].into_iter().map(|m| case(m, N, gravity, Role::Figure)),
+            );
         }
     }
     for n in [10, 20, 40, 80, 160] {
-        cases.extend([direct(1), direct(2), der(1), der(2), paper(20, 1), pber(20, 1)].into_iter().map(|m| case(m, n, weak(), Role::Sweep)));
+        cases.extend(
+            [direct(1), direct(2), der(1), der(2), paper(20, 1), pber(20, 1)]
+                .into_iter()
+                .map(|m| case(m, n, weak(), Role::Sweep)),
+        );
     }
     for iterations in [5, 80, 320] {
-        cases.extend([paper(iterations, 1), pber(iterations as usize, 1)].into_iter().map(|m| case(m, N, weak(), Role::Sweep)));
+        cases.extend(
+            [paper(iterations, 1), pber(iterations as usize, 1)].into_iter().map(|m| case(m, N, weak(), Role::Sweep)),
+        );
     }
-    Plan::new(cases, |c| format!("{}, {} elements, {}, g {}", c.method.name(), c.n, c.method.budget(), number(c.gravity)), simulate, finish)
+    Plan::new(
+        cases,
+        |c| format!("{}, {} elements, {}, g {}", c.method.name(), c.n, c.method.budget(), number(c.gravity)),
+        simulate,
+        finish,
+    )
 }
 
 fn simulate(case: &Case) -> Answer {
@@ -133,17 +168,32 @@ fn simulate(case: &Case) -> Answer {
     });
     let points = solver.positions().to_vec();
     if !sane(&points, LENGTH) {
-        return Answer { shape: Vec::new(), points, out_of_plane: f64::NAN, elongation: f64::NAN, ms, restless: f64::NAN };
+        return Answer {
+            shape: Vec::new(),
+            points,
+            out_of_plane: f64::NAN,
+            elongation: f64::NAN,
+            ms,
+            restless: f64::NAN,
+        };
     }
     let l = solver.rest_lengths()[0];
-    let shape = (0..=POINTS).map(|k| at_arc(&points, solver.rest_lengths(), -0.5 * l, LENGTH * k as f64 / POINTS as f64)).collect();
+    let shape = (0..=POINTS)
+        .map(|k| at_arc(&points, solver.rest_lengths(), -0.5 * l, LENGTH * k as f64 / POINTS as f64))
+        .collect();
     let restless = points.iter().zip(&before).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
     Answer { shape, out_of_plane: out_of_plane(&points), elongation: solver.elongation(), points, ms, restless }
 }
 
 fn finish(found: &[(Case, Answer)]) -> Outcome {
     let mut out = Outcome::default();
-    let converged = |gravity: f64| found.iter().find(|(c, _)| c.role == Role::Converged && c.gravity == gravity).map(|(_, a)| a).expect("it was run");
+    let converged = |gravity: f64| {
+        found
+            .iter()
+            .find(|(c, _)| c.role == Role::Converged && c.gravity == gravity)
+            .map(|(_, a)| a)
+            .expect("it was run")
+    };
     let error = |c: &Case, a: &Answer| {
         let reference = converged(c.gravity);
         if a.shape.is_empty() { f64::NAN } else { apart_about_x(&a.shape, &reference.shape) / LENGTH }
@@ -162,9 +212,17 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         "elongation",
         "moved in the last second [mm]",
     ];
-    let mut table = Table::new("loop", "Out-of-plane distance of the loop at rest, 40 elements (converged: DER, 320 elements)", &headings);
-    let mut times =
-        Table::new("times", "CPU time of a frame, 40 elements", &["gravity [m/s^2]", "method", "steps x iterations", "ms a frame (median)"]).measured();
+    let mut table = Table::new(
+        "loop",
+        "Out-of-plane distance of the loop at rest, 40 elements (converged: DER, 320 elements)",
+        &headings,
+    );
+    let mut times = Table::new(
+        "times",
+        "CPU time of a frame, 40 elements",
+        &["gravity [m/s^2]", "method", "steps x iterations", "ms a frame (median)"],
+    )
+    .measured();
     for (c, a) in found.iter().filter(|(c, _)| c.role != Role::Sweep) {
         table.row([
             c.gravity.into(),
@@ -187,14 +245,18 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         figures().find(|(c, _)| fits(c) && (stiffness(&c.method) != "0.05 : 0.25" || !own)).expect("it was run")
     };
     let weak = weak();
-    let [p, pb, pl, d, rod] = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
-        .map(|(name, budget)| pick(name, budget, true, weak));
-    let strong = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20")].map(|(name, budget)| pick(name, budget, true, GRAVITY));
-    let [p0, pb0, pl0, d0, rod0] = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
-        .map(|(name, budget)| pick(name, budget, true, NUDGE));
+    let [p, pb, pl, d, rod] =
+        [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
+            .map(|(name, budget)| pick(name, budget, true, weak));
+    let strong = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20")]
+        .map(|(name, budget)| pick(name, budget, true, GRAVITY));
+    let [p0, pb0, pl0, d0, rod0] =
+        [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
+            .map(|(name, budget)| pick(name, budget, true, NUDGE));
     let few = pick("PBER", "1 x 20", true, NUDGE);
     let (d_true, p_ten) = (pick("direct", "4 x Newton", true, GRAVITY), pick("paper", "10 x 20", true, GRAVITY));
-    let default = figures().find(|(c, _)| c.gravity == weak && stiffness(&c.method) == "0.05 : 0.25").expect("it was run");
+    let default =
+        figures().find(|(c, _)| c.gravity == weak && stiffness(&c.method) == "0.05 : 0.25").expect("it was run");
 
     let physical = [
         (d0, "direct, without gravity"),
@@ -209,7 +271,12 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         .chain([(p, "paper, effective scale"), (pb, "PBER, effective scale")])
     {
         let e = loop_error(c, a);
-        out.checks.push(Check::new(format!("loop of {name}, against converged DER"), "within 10 %", percent(e), e.abs() <= 0.1));
+        out.checks.push(Check::new(
+            format!("loop of {name}, against converged DER"),
+            "within 10 %",
+            percent(e),
+            e.abs() <= 0.1,
+        ));
     }
     for (found, place) in [(pl0, "without gravity"), (pl, "effective scale")] {
         out.checks.push(Check::new(
@@ -234,7 +301,9 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         true_scale: strong.map(|(_, a)| number(a.ms)).join(" / "),
         direct: format!("{} (DER {})", number(d_true.1.ms), number(pick("DER", "1 x Newton", true, GRAVITY).1.ms)),
     });
-    out.checks.push(Check::new("paper, 40 elements, 20 iterations: ms a frame", "<= 0.1", number(p.1.ms), p.1.ms <= 0.1).measured());
+    out.checks.push(
+        Check::new("paper, 40 elements, 20 iterations: ms a frame", "<= 0.1", number(p.1.ms), p.1.ms <= 0.1).measured(),
+    );
 
     // Cost against error: a method is better where its curve lies farther to the lower left.
     let mut plot = Plot::new(
@@ -250,11 +319,18 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         &["method", "elements", "steps x iterations", "error / length", "elongation"],
     )
     .hidden();
-    let mut costs = Table::new("costs", "Cost by method, elements and budget", &["method", "elements", "steps x iterations", "error / length", "ms a frame"])
-        .measured()
-        .hidden();
+    let mut costs = Table::new(
+        "costs",
+        "Cost by method, elements and budget",
+        &["method", "elements", "steps x iterations", "error / length", "ms a frame"],
+    )
+    .measured()
+    .hidden();
     let mut lines: Vec<(String, Vec<(f64, f64)>)> = Vec::new();
-    for (c, a) in found.iter().filter(|(c, _)| c.gravity == weak && c.role != Role::Converged && stiffness(&c.method) != "0.05 : 0.25") {
+    for (c, a) in found
+        .iter()
+        .filter(|(c, _)| c.gravity == weak && c.role != Role::Converged && stiffness(&c.method) != "0.05 : 0.25")
+    {
         let e = error(c, a);
         sweep.row([c.method.name().into(), c.n.into(), c.method.budget().into(), e.into(), a.elongation.into()]);
         costs.row([c.method.name().into(), c.n.into(), c.method.budget().into(), e.into(), a.ms.into()]);
@@ -270,13 +346,16 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         }
     }
     let budgets = |name: &str| -> Vec<(f64, f64)> {
-        let mut own: Vec<&(Case, Answer)> =
-            found.iter().filter(|(c, _)| c.role == Role::Sweep && c.n == N && c.method.name() == name && c.gravity == weak).collect();
+        let mut own: Vec<&(Case, Answer)> = found
+            .iter()
+            .filter(|(c, _)| c.role == Role::Sweep && c.n == N && c.method.name() == name && c.gravity == weak)
+            .collect();
         own.sort_by(|a, b| a.1.ms.total_cmp(&b.1.ms));
         own.into_iter().map(|(c, a)| (error(c, a), a.ms)).collect()
     };
     let cheapest = |name: &str, bound: f64| {
-        let all = found.iter().filter(|(c, _)| c.role != Role::Converged && c.gravity == weak && c.method.name() == name);
+        let all =
+            found.iter().filter(|(c, _)| c.role != Role::Converged && c.gravity == weak && c.method.name() == name);
         all.filter(|(c, a)| error(c, a) <= bound).map(|(_, a)| a.ms).fold(f64::INFINITY, f64::min)
     };
     for (name, mut points) in lines {
@@ -301,8 +380,15 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         let cell = |v: f64| if v.is_finite() { v.into() } else { "not reached".into() };
         equal.row([percent(bound).into(), cell(d), cell(rest[0]), cell(rest[1]), cell(rest[2])]);
     }
-    let words = if dearer.is_empty() { "yes".into() } else { format!("all but {}, where DER with 10 elements is", dearer.join(", ")) };
-    out.checks.push(Check::new("direct is the cheapest at equal error", "at each error of the table", words, dearer.is_empty()).measured());
+    let words = if dearer.is_empty() {
+        "yes".into()
+    } else {
+        format!("all but {}, where DER with 10 elements is", dearer.join(", "))
+    };
+    out.checks.push(
+        Check::new("direct is the cheapest at equal error", "at each error of the table", words, dearer.is_empty())
+            .measured(),
+    );
 
     out.say(format!(
         "A thread of 15 cm between clamps (0.3 mm, 2 GPa, Poisson's ratio 0.4), straight at rest. In {MOVE} s the ends come together by 5 cm while one turns once; then all comes to rest. The \
@@ -345,9 +431,24 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         number(p.1.ms / pl.1.ms)
     ));
 
-    out.pictures.push(picture(found, NUDGE, "loop", "Without gravity, from the side (top row) and from above (bottom row)"));
-    out.pictures.push(picture(found, weak, "effective", "At the effective scale, from the side (top row) and from above (bottom row)"));
-    out.pictures.push(picture(found, GRAVITY, "true", "At true scale, from the side (top row) and from above (bottom row)"));
+    out.pictures.push(picture(
+        found,
+        NUDGE,
+        "loop",
+        "Without gravity, from the side (top row) and from above (bottom row)",
+    ));
+    out.pictures.push(picture(
+        found,
+        weak,
+        "effective",
+        "At the effective scale, from the side (top row) and from above (bottom row)",
+    ));
+    out.pictures.push(picture(
+        found,
+        GRAVITY,
+        "true",
+        "At true scale, from the side (top row) and from above (bottom row)",
+    ));
     out.plots.push(plot);
     out.tables.extend([table, times, equal, sweep, costs]);
     out
@@ -364,13 +465,24 @@ fn stiffness(m: &Method) -> String {
 }
 
 fn picture(found: &[(Case, Answer)], gravity: f64, name: &str, title: &str) -> Picture {
-    let shown = [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")].map(|(m, budget)| {
-        let fits = |c: &Case| c.role == Role::Figure && c.gravity == gravity && c.method.name() == m && c.method.budget() == budget;
-        found.iter().find(|(c, _)| fits(c) && stiffness(&c.method) != "0.05 : 0.25").expect("it was run")
-    });
+    let shown =
+        [("paper", "1 x 20"), ("PBER", "1 x 80"), ("PBD", "1 x 20"), ("direct", "4 x Newton"), ("DER", "1 x Newton")]
+            .map(|(m, budget)| {
+                let fits = |c: &Case| {
+                    c.role == Role::Figure
+                        && c.gravity == gravity
+                        && c.method.name() == m
+                        && c.method.budget() == budget
+                };
+                found.iter().find(|(c, _)| fits(c) && stiffness(&c.method) != "0.05 : 0.25").expect("it was run")
+            });
     let panel = |(c, a): &(Case, Answer), above: bool| Panel {
         label: format!("{}{}", c.method.name(), if above { ", from above" } else { "" }),
-        tubes: if sane(&a.points, 0.01 * LENGTH) { vec![Tube { points: upright(&a.points), radius: 6e-4 }] } else { Vec::new() },
+        tubes: if sane(&a.points, 0.01 * LENGTH) {
+            vec![Tube { points: upright(&a.points), radius: 6e-4 }]
+        } else {
+            Vec::new()
+        },
         solids: Vec::new(),
         look: if above { (DVec3::NEG_Z, DVec3::Y) } else { (DVec3::Y, DVec3::Z) },
         frame: Some((DVec3::new(0.5 * LENGTH, 0.0, if above { 0.0 } else { -0.03 }), 0.14)),

@@ -9,7 +9,12 @@ use sutura::glam::{DQuat, DVec3};
 use sutura::{PaperSettings, knot};
 use sutura_rivals::{Hold, Pose, Rod, Scene, Solver as _};
 
-pub const EXPERIMENT: Experiment = Experiment { name: "fig9", title: "Circles wound by ten pi of turn, over stiffness in bending", figures: "9", plan };
+pub const EXPERIMENT: Experiment = Experiment {
+    name: "fig9",
+    title: "Circles wound by ten pi of turn, over stiffness in bending",
+    figures: "9",
+    plan,
+};
 
 const N: usize = 120;
 /// Turns of the right end: 10 pi.
@@ -44,15 +49,22 @@ struct Answer {
 
 fn plan() -> Plan {
     let cases = [false, true].into_iter().flat_map(|ours| RATIOS.map(|ratio| Case { ratio, ours })).collect();
-    Plan::new(cases, |c| format!("{}, bending over twist {}", if c.ours { "direct" } else { "paper" }, c.ratio), simulate, finish)
+    Plan::new(
+        cases,
+        |c| format!("{}, bending over twist {}", if c.ours { "direct" } else { "paper" }, c.ratio),
+        simulate,
+        finish,
+    )
 }
 
-/// For the paper's solver a chain of spheres that touch; for the other a thread of 0.3 mm, of which only the stiffness in bending is changed.
+/// For the paper's solver a chain of spheres that touch; for the other a thread of 0.3 mm, of which only the stiffness
+/// in bending is changed.
 fn wound(case: &Case) -> Scene {
     let l = LENGTH / (N as f64 - 1.0);
     let (shape, frame) = level(-0.5 * l, LENGTH + 0.5 * l, N);
     let round = thread(shape.clone(), shape);
-    let rod = Rod { young: round.young * case.ratio / 1.4, radius: if case.ours { round.radius } else { 0.5 * l }, ..round };
+    let rod =
+        Rod { young: round.young * case.ratio / 1.4, radius: if case.ours { round.radius } else { 0.5 * l }, ..round };
     let way = 0.5 * (1.0 - NEAR) * LENGTH;
     let near = move |t: f64| way * (t / PRESS).min(1.0);
     let turned = |t: f64| DQuat::from_rotation_x(TAU * TURNS * ((t - PRESS) / TURN).clamp(0.0, 1.0));
@@ -67,7 +79,10 @@ fn simulate(case: &Case) -> Answer {
     let method = if case.ours {
         Method::Direct(Direct::default())
     } else {
-        Method::Paper(PaperSettings { bend: [(TWIST * case.ratio).min(1.0); 2], twist: TWIST, ..PaperSettings::default() }, 1)
+        Method::Paper(
+            PaperSettings { bend: [(TWIST * case.ratio).min(1.0); 2], twist: TWIST, ..PaperSettings::default() },
+            1,
+        )
     };
     let mut ours = Ours::new(wound(case), &method);
     for _ in 0..FRAMES {
@@ -81,7 +96,8 @@ fn simulate(case: &Case) -> Answer {
 /// Writhe of the thread with its ends extended far along x: circles wound.
 fn writhe(points: &[DVec3]) -> f64 {
     let far = DVec3::X * (1e4 * LENGTH);
-    let extended: Vec<DVec3> = [points[0] - far].into_iter().chain(points.iter().copied()).chain([points[points.len() - 1] + far]).collect();
+    let extended: Vec<DVec3> =
+        [points[0] - far].into_iter().chain(points.iter().copied()).chain([points[points.len() - 1] + far]).collect();
     knot::writhe(&extended, false)
 }
 
@@ -91,11 +107,25 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
     let mut table = Table::new(
         "circles",
         "Circles wound (writhe of the centerline, in turns) by 5 turns of the end",
-        &["method", "bending over twist", "circles", "left as twist [turns]", "frames without an answer", "frames off its length"],
+        &[
+            "method",
+            "bending over twist",
+            "circles",
+            "left as twist [turns]",
+            "frames without an answer",
+            "frames off its length",
+        ],
     );
     for (c, a) in found {
         let method = if c.ours { "direct" } else { "paper" };
-        table.row([method.into(), c.ratio.into(), a.writhe.into(), (TURNS - a.writhe.abs()).into(), a.incidents.into(), a.off_length.into()]);
+        table.row([
+            method.into(),
+            c.ratio.into(),
+            a.writhe.into(),
+            (TURNS - a.writhe.abs()).into(),
+            a.incidents.into(),
+            a.off_length.into(),
+        ]);
     }
     let words = |ours: bool| of(ours).iter().map(|(_, a)| number(a.writhe.abs())).collect::<Vec<_>>().join(", ");
     let ratios = RATIOS.map(number).join(", ");
@@ -107,7 +137,12 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         direct: words(true),
     });
     let clean = of(true).iter().all(|(_, a)| a.incidents == 0 && a.points.iter().all(|p| p.is_finite()));
-    out.checks.push(Check::new("direct winds at every stiffness, each step with an answer", "yes", if clean { "yes" } else { "no" }, clean));
+    out.checks.push(Check::new(
+        "direct winds at every stiffness, each step with an answer",
+        "yes",
+        if clean { "yes" } else { "no" },
+        clean,
+    ));
     let energy_order = of(true).windows(2).all(|w| w[1].1.writhe.abs() >= w[0].1.writhe.abs() - 0.05);
     out.checks.push(Check::new(
         "direct: what is softer in bending turns more of the twist into circles",

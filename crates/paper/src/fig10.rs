@@ -8,7 +8,8 @@ use sutura::glam::DVec3;
 use sutura::{Integrator, PaperSettings};
 use sutura_rivals::{Hold, Pose, Rod, Scene, der};
 
-pub const EXPERIMENT: Experiment = Experiment { name: "fig10", title: "A falling end, against discrete elastic rods", figures: "10", plan };
+pub const EXPERIMENT: Experiment =
+    Experiment { name: "fig10", title: "A falling end, against discrete elastic rods", figures: "10", plan };
 
 /// Elements; of the converged rod four times as many.
 const N: usize = 40;
@@ -83,11 +84,19 @@ fn simulate(case: &Case) -> Answer {
     let mut solver = case.method.start(falling(case.n, case.size));
     let shape = |points: &[DVec3]| points.iter().map(|p| *p / case.size).collect::<Vec<_>>();
     let rest: f64 = solver.rest_lengths().iter().sum();
-    let mut answer = Answer { tip: vec![solver.positions()[case.n] / case.size], shapes: vec![shape(solver.positions())], elongation: 0.0 };
+    let mut answer = Answer {
+        tip: vec![solver.positions()[case.n] / case.size],
+        shapes: vec![shape(solver.positions())],
+        elongation: 0.0,
+    };
     for k in 1..=FRAMES {
         for _ in 0..pieces {
             solver.step(FRAME);
-            let now = if sane(solver.positions(), case.size) { (length(solver.positions()) / rest - 1.0).abs() } else { f64::NAN };
+            let now = if sane(solver.positions(), case.size) {
+                (length(solver.positions()) / rest - 1.0).abs()
+            } else {
+                f64::NAN
+            };
             answer.elongation = if now > answer.elongation || now.is_nan() { now } else { answer.elongation };
         }
         answer.tip.push(solver.positions()[case.n] / case.size);
@@ -113,25 +122,63 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         &["method", "elements", "steps a frame x iterations", "tip, over the length", "change of length"],
     );
     for (c, a) in found {
-        table.row([c.name.clone().into(), c.n.into(), c.method.budget().into(), percent(apart(a, reference)).into(), percent(a.elongation).into()]);
+        table.row([
+            c.name.clone().into(),
+            c.n.into(),
+            c.method.budget().into(),
+            percent(apart(a, reference)).into(),
+            percent(a.elongation).into(),
+        ]);
     }
-    let mut path = Table::new("path", "Path of the tip over the length", &["method", "steps a frame x iterations", "time [s]", "x", "z"]).hidden();
+    let mut path = Table::new(
+        "path",
+        "Path of the tip over the length",
+        &["method", "steps a frame x iterations", "time [s]", "x", "z"],
+    )
+    .hidden();
     for (c, a) in found {
         for (k, p) in a.tip.iter().enumerate() {
-            path.row([c.name.clone().into(), c.method.budget().into(), (k as f64 * FRAME).into(), p.x.into(), p.z.into()]);
+            path.row([
+                c.name.clone().into(),
+                c.method.budget().into(),
+                (k as f64 * FRAME).into(),
+                p.x.into(),
+                p.z.into(),
+            ]);
         }
     }
     let own_error = apart(of(HALF), reference);
-    for (name, words) in [(SECOND, "direct (second order, the default 4 substeps)"), (DEFAULT, "direct (default: implicit Euler, 4 substeps)")] {
+    for (name, words) in [
+        (SECOND, "direct (second order, the default 4 substeps)"),
+        (DEFAULT, "direct (default: implicit Euler, 4 substeps)"),
+    ] {
         let e = apart(of(name), reference);
-        out.checks.push(Check::new(format!("tip path of {words} against converged DER, up to 0.2 s"), "within 1 % of the length", percent(e), e <= 0.01));
+        out.checks.push(Check::new(
+            format!("tip path of {words} against converged DER, up to 0.2 s"),
+            "within 1 % of the length",
+            percent(e),
+            e <= 0.01,
+        ));
     }
-    out.checks.push(Check::new("the converged DER has converged", "half as many substeps: within 0.2 %", percent(own_error), own_error < 2e-3));
+    out.checks.push(Check::new(
+        "the converged DER has converged",
+        "half as many substeps: within 0.2 %",
+        percent(own_error),
+        own_error < 2e-3,
+    ));
     out.compare.push(Compare {
         what: "10: tip path against DER up to 0.2 s, over the length".into(),
         published: "similar shapes, constant length (pictures)".into(),
-        effective: format!("{}, length {}", percent(apart(of("paper, effective scale"), reference)), percent(of("paper, effective scale").elongation)),
-        true_scale: format!("{}, length {}", percent(apart(of("paper, true scale"), reference)), percent(of("paper, true scale").elongation)),
+        effective: format!(
+            "{}, length {}",
+            percent(apart(of("paper, effective scale"), reference)),
+            percent(of("paper, effective scale").elongation)
+        ),
+        true_scale: format!(
+            "{}, length {}",
+            percent(apart(of("paper, true scale"), reference)),
+            percent(of("paper, true scale").elongation)
+        ),
         direct: format!(
             "{} (second order), {} (default), length {}",
             percent(apart(of(SECOND), reference)),
@@ -149,7 +196,8 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         "At 15 m times are ten times as long (a fall goes with the root of the length), so that the paper's states at 0.1 and 0.2 s are shown at 1 and 2 s. Its stiffness numbers have no relation to a modulus: at the effective \
          scale the thread falls nearly as one without stiffness; how near it is to 2 GPa is chance. What `direct` misses at its default is the order of its integration in time: implicit Euler damps a fall, the second order does not.",
     );
-    let mut plot = Plot::new("tip", "Path of the tip up to 0.2 s", Axis::new("x over length", ""), Axis::new("z over length", ""));
+    let mut plot =
+        Plot::new("tip", "Path of the tip up to 0.2 s", Axis::new("x over length", ""), Axis::new("z over length", ""));
     let line = |a: &Answer| a.tip.iter().map(|p| (p.x, p.z)).collect::<Vec<_>>();
     for name in [CONVERGED, SECOND, DEFAULT, "paper, effective scale", "paper, true scale"] {
         plot.line(name, line(of(name)));

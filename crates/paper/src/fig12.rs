@@ -9,7 +9,8 @@ use sutura::glam::DVec3;
 use sutura::{Integrator, PaperSettings};
 use sutura_rivals::{Hold, Pose, Scene, Solver as _};
 
-pub const EXPERIMENT: Experiment = Experiment { name: "fig12", title: "Damping: pressed together and let go", figures: "11, 12", plan };
+pub const EXPERIMENT: Experiment =
+    Experiment { name: "fig12", title: "Damping: pressed together and let go", figures: "11, 12", plan };
 
 const N: usize = 49;
 const LENGTH: f64 = 0.02;
@@ -71,13 +72,22 @@ fn pressed() -> Scene {
 
 fn simulate(case: &Case) -> Answer {
     let mut ours = Ours::new(pressed(), &case.method);
-    let settings = sutura::Settings { linear_damping: case.linear, angular_damping: case.angular, ..ours.world.settings().clone() };
+    let settings = sutura::Settings {
+        linear_damping: case.linear,
+        angular_damping: case.angular,
+        ..ours.world.settings().clone()
+    };
     ours.world.set_settings(settings).expect("valid settings");
     let rest = ours.positions().to_vec();
     for _ in 0..PRESS + REST {
         ours.step(FRAME);
     }
-    let mut answer = Answer { sums: Vec::new(), energy: Vec::new(), shapes: vec![rest.clone(), ours.positions().to_vec()], incidents: 0 };
+    let mut answer = Answer {
+        sums: Vec::new(),
+        energy: Vec::new(),
+        shapes: vec![rest.clone(), ours.positions().to_vec()],
+        incidents: 0,
+    };
     let look = |ours: &Ours, answer: &mut Answer| {
         answer.sums.push(ours.positions().iter().zip(&rest).map(|(p, q)| p.distance(*q)).sum());
         answer.energy.push(ours.world.rod(ours.rod).expect("the thread is there").energy().total());
@@ -131,12 +141,24 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
             "energy: greatest later over first, less one",
         ],
     );
-    let mut curves = Table::new("frames", "Sum of distances by frame", &["method", "damping", "frame", "sum of distances [m]", "energy [J]"]).hidden();
+    let mut curves = Table::new(
+        "frames",
+        "Sum of distances by frame",
+        &["method", "damping", "frame", "sum of distances [m]", "energy [J]"],
+    )
+    .hidden();
     let series = |name: &str| matches!(name, PAPER | ANGULAR | LINEAR | DEFAULT);
     for (c, a) in found.iter().filter(|(c, _)| series(c.name)) {
         let d = c.linear.max(c.angular);
         let grown = if c.name == PAPER { "none is defined".into() } else { growth(&a.energy).into() };
-        table.row([c.name.into(), d.into(), (1e3 * a.sums[0]).into(), (1e3 * mean(&a.sums)).into(), (1e3 * late(&a.sums)).into(), grown]);
+        table.row([
+            c.name.into(),
+            d.into(),
+            (1e3 * a.sums[0]).into(),
+            (1e3 * mean(&a.sums)).into(),
+            (1e3 * late(&a.sums)).into(),
+            grown,
+        ]);
         for (k, (s, e)) in a.sums.iter().zip(&a.energy).enumerate() {
             let e = if c.name == PAPER { f64::NAN } else { *e };
             curves.row([c.name.into(), d.into(), k.into(), (*s).into(), e.into()]);
@@ -168,7 +190,8 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         words,
         tops.len() > 1 && tops.windows(2).all(|t| t[1] <= t[0]),
     ));
-    let grown = [ANGULAR, LINEAR].iter().flat_map(|name| of(name)).map(|a| growth(&a.energy)).fold(f64::NEG_INFINITY, f64::max);
+    let grown =
+        [ANGULAR, LINEAR].iter().flat_map(|name| of(name)).map(|a| growth(&a.energy)).fold(f64::NEG_INFINITY, f64::max);
     out.checks.push(Check::new(
         "direct: the energy of no later frame is above that when let go",
         "<= 0 %",
@@ -184,7 +207,11 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
         direct: format!("{} (linear damping, second order, 100 substeps)", words(LINEAR)),
     });
     let stop = of(DEFAULT)[0];
-    let settled = stop.sums.iter().position(|s| *s < 0.01 * stop.sums[0]).map_or_else(|| "not within 500 frames".into(), |k| format!("after {k} frames"));
+    let settled = stop
+        .sums
+        .iter()
+        .position(|s| *s < 0.01 * stop.sums[0])
+        .map_or_else(|| "not within 500 frames".into(), |k| format!("after {k} frames"));
     out.say(format!(
         "2 cm, 49 elements, no gravity, left end clamped, right end pressed in by 1 cm and let go; 500 frames. On its way the end goes aside by a little, since a thread pressed exactly along itself stays straight. Without gravity the paper's solver does not know a scale at all: true and effective are the same. \
          In a real thread this is a vibration at some 140 Hz and above, and what da damps, the spin of the sections, carries next to nothing of it: `direct` with da = 0, 0.2, 0.4 gives {} mm, all alike. \
@@ -195,7 +222,9 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
     ));
     let mut panels = Vec::new();
     for (name, label) in [(PAPER, "paper"), (LINEAR, "direct")] {
-        for (points, moment) in of(name)[0].shapes.iter().zip(["at rest", "pressed", "10 frames after", "500 frames after"]) {
+        for (points, moment) in
+            of(name)[0].shapes.iter().zip(["at rest", "pressed", "10 frames after", "500 frames after"])
+        {
             panels.push(Panel {
                 label: format!("{label}, {moment}"),
                 tubes: vec![Tube { points: points.clone(), radius: 1.5e-4 }],
@@ -205,7 +234,12 @@ fn finish(found: &[(Case, Answer)]) -> Outcome {
             });
         }
     }
-    out.pictures.push(Picture { name: "states".into(), title: "Figure 11, without damping".into(), columns: 4, panels });
+    out.pictures.push(Picture {
+        name: "states".into(),
+        title: "Figure 11, without damping".into(),
+        columns: 4,
+        panels,
+    });
     for (name, file, title) in [
         (PAPER, "paper", "Figure 12, the paper's solver: sum of distances over frames"),
         (LINEAR, "direct", "The same, direct with linear damping"),

@@ -29,7 +29,12 @@ fn plan() -> Plan {
         }
     }
     cases.extend(OURS.map(|(substeps, newton)| (direct(substeps, newton), 0.15)));
-    Plan::new(cases, |(m, size)| format!("{}, {}, {size} m", m.name(), m.budget()), |(m, size)| fall(m, *size, N), finish)
+    Plan::new(
+        cases,
+        |(m, size)| format!("{}, {}, {size} m", m.name(), m.budget()),
+        |(m, size)| fall(m, *size, N),
+        finish,
+    )
 }
 
 fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
@@ -38,32 +43,63 @@ fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
         let fits = |m: &Method| matches!(m, Method::Paper(p, _) if p.direct_distance == ddc);
         found.iter().filter(|((m, s), _)| *s == size && fits(m)).map(|(_, f)| f).collect()
     };
-    let ours: Vec<(&Method, &Fall)> = found.iter().filter(|((m, _), _)| matches!(m, Method::Direct(_))).map(|((m, _), f)| (m, f)).collect();
+    let ours: Vec<(&Method, &Fall)> =
+        found.iter().filter(|((m, _), _)| matches!(m, Method::Direct(_))).map(|((m, _), f)| (m, f)).collect();
 
-    let headings = ["length [m]", "method", "steps x iterations", "DDC", "greatest elongation", "mean of the last second"];
-    let mut table = Table::new("elongation", "Elongation of the thread as a whole in 5 s of falling and swinging, 120 elements", &headings);
-    let mut times = Table::new("times", "CPU time of a frame", &["length [m]", "method", "steps x iterations", "DDC", "ms a frame (median)"]).measured();
+    let headings =
+        ["length [m]", "method", "steps x iterations", "DDC", "greatest elongation", "mean of the last second"];
+    let mut table = Table::new(
+        "elongation",
+        "Elongation of the thread as a whole in 5 s of falling and swinging, 120 elements",
+        &headings,
+    );
+    let mut times = Table::new(
+        "times",
+        "CPU time of a frame",
+        &["length [m]", "method", "steps x iterations", "DDC", "ms a frame (median)"],
+    )
+    .measured();
     for ((m, size), f) in found {
         let (ddc, budget) = match m {
             Method::Paper(p, _) => (if p.direct_distance { "yes" } else { "no" }, m.budget()),
             Method::Direct(d) => ("-", format!("{} x at most {}", d.substeps, d.newton_max)),
             _ => ("", String::new()),
         };
-        table.row([(*size).into(), m.name().into(), budget.clone().into(), ddc.into(), percent(f.worst).into(), percent(f.last).into()]);
+        table.row([
+            (*size).into(),
+            m.name().into(),
+            budget.clone().into(),
+            ddc.into(),
+            percent(f.worst).into(),
+            percent(f.last).into(),
+        ]);
         times.row([(*size).into(), m.name().into(), budget.into(), ddc.into(), f.ms.into()]);
     }
-    let mut exact =
-        Table::new("elongation_numbers", "Elongation", &["length [m]", "method", "substeps", "iterations", "DDC", "greatest", "last second"]).hidden();
+    let mut exact = Table::new(
+        "elongation_numbers",
+        "Elongation",
+        &["length [m]", "method", "substeps", "iterations", "DDC", "greatest", "last second"],
+    )
+    .hidden();
     for ((m, size), f) in found {
         let (substeps, iterations, ddc) = match m {
             Method::Paper(p, n) => (*n, p.iterations, if p.direct_distance { "yes" } else { "no" }),
             Method::Direct(d) => (d.substeps, d.newton_max, "-"),
             _ => (0, 0, ""),
         };
-        exact.row([(*size).into(), m.name().into(), substeps.into(), iterations.into(), ddc.into(), f.worst.into(), f.last.into()]);
+        exact.row([
+            (*size).into(),
+            m.name().into(),
+            substeps.into(),
+            iterations.into(),
+            ddc.into(),
+            f.worst.into(),
+            f.last.into(),
+        ]);
     }
 
-    let list = |falls: &[&Fall], of: fn(&Fall) -> f64| falls.iter().map(|f| percent(of(f))).collect::<Vec<_>>().join(", ");
+    let list =
+        |falls: &[&Fall], of: fn(&Fall) -> f64| falls.iter().map(|f| percent(of(f))).collect::<Vec<_>>().join(", ");
     let (with, without) = (paper_of(15.0, true), paper_of(15.0, false));
     let worst_ours = ours.iter().map(|(_, f)| f.worst).fold(0.0, f64::max);
     out.checks.push(Check::new(
@@ -72,7 +108,9 @@ fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
         list(&with, |f| f.worst),
         with.iter().all(|f| f.worst <= 0.032),
     ));
-    let falls = without.windows(2).all(|p| p[1].worst < p[0].worst) && (0.1..1.0).contains(&without[0].worst) && without[3].worst < 0.1;
+    let falls = without.windows(2).all(|p| p[1].worst < p[0].worst)
+        && (0.1..1.0).contains(&without[0].worst)
+        && without[3].worst < 0.1;
     out.checks.push(Check::new(
         "without DDC, effective scale: from tens of percent at 5 to a few at 40",
         "10 to 100 % at 5, falling, under 10 % at 40",
@@ -82,13 +120,30 @@ fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
     for (falls, name) in [(&with, "with"), (&without, "without")] {
         let line: Vec<(f64, f64)> = BUDGETS.iter().zip(falls).map(|(its, f)| (f64::from(*its), f.ms)).collect();
         let r2 = fit(&line).2;
-        out.checks.push(Check::new(format!("{name} DDC: time linear in iterations"), "R^2 > 0.99", format!("R^2 = {r2:.4}"), r2 > 0.99).measured());
+        out.checks.push(
+            Check::new(
+                format!("{name} DDC: time linear in iterations"),
+                "R^2 > 0.99",
+                format!("R^2 = {r2:.4}"),
+                r2 > 0.99,
+            )
+            .measured(),
+        );
     }
-    out.checks.push(Check::new("direct, true scale: elongation at every budget", "<= 0.001 %", format!("at most {}", percent(worst_ours)), worst_ours <= 1e-5));
+    out.checks.push(Check::new(
+        "direct, true scale: elongation at every budget",
+        "<= 0.001 %",
+        format!("at most {}", percent(worst_ours)),
+        worst_ours <= 1e-5,
+    ));
     let said: usize = ours.iter().map(|(_, f)| f.incidents).sum();
     out.checks.push(Check::new("direct, true scale: no step without an answer", "0", said.to_string(), said == 0));
 
-    let own = ours.iter().find(|(m, _)| matches!(m, Method::Direct(d) if (d.substeps, d.newton_max) == (4, 12))).expect("it was run").1;
+    let own = ours
+        .iter()
+        .find(|(m, _)| matches!(m, Method::Direct(d) if (d.substeps, d.newton_max) == (4, 12)))
+        .expect("it was run")
+        .1;
     let rows: [(&str, &str, bool); 2] = [
         ("13, 14: elongation with DDC at 5, 10, 20, 40 iterations", "under 3.2 % each", true),
         ("13, 14: elongation without", "38.9 % at 5, 4.2 % at 40", false),
@@ -111,13 +166,28 @@ fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
         direct: number(own.ms),
     });
 
-    let points = |falls: &[&Fall], of: fn(&Fall) -> f64| BUDGETS.iter().zip(falls).map(|(its, f)| (f64::from(*its), of(f))).collect::<Vec<_>>();
-    let mut lengths = Plot::new("elongation", "Figure 14: elongation over iterations", Axis::new("iterations", ""), Axis::log("greatest elongation", "%"));
-    let mut time = Plot::new("time", "Figure 15: time over iterations, 15 m", Axis::new("iterations", ""), Axis::new("CPU time of a frame", "ms"));
+    let points = |falls: &[&Fall], of: fn(&Fall) -> f64| {
+        BUDGETS.iter().zip(falls).map(|(its, f)| (f64::from(*its), of(f))).collect::<Vec<_>>()
+    };
+    let mut lengths = Plot::new(
+        "elongation",
+        "Figure 14: elongation over iterations",
+        Axis::new("iterations", ""),
+        Axis::log("greatest elongation", "%"),
+    );
+    let mut time = Plot::new(
+        "time",
+        "Figure 15: time over iterations, 15 m",
+        Axis::new("iterations", ""),
+        Axis::new("CPU time of a frame", "ms"),
+    );
     time.measured = true;
-    for (size, ddc, name) in
-        [(15.0, false, "without DDC, 15 m"), (15.0, true, "with DDC, 15 m"), (0.15, false, "without DDC, 15 cm"), (0.15, true, "with DDC, 15 cm")]
-    {
+    for (size, ddc, name) in [
+        (15.0, false, "without DDC, 15 m"),
+        (15.0, true, "with DDC, 15 m"),
+        (0.15, false, "without DDC, 15 cm"),
+        (0.15, true, "with DDC, 15 cm"),
+    ] {
         lengths.line(name, points(&paper_of(size, ddc), |f| 100.0 * f.worst));
         if size > 1.0 {
             time.line(name, points(&paper_of(size, ddc), |f| f.ms));
@@ -142,14 +212,19 @@ fn finish(found: &[((Method, f64), Fall)]) -> Outcome {
 
     let view = |f: &Fall, label: String, size: f64| Panel {
         label,
-        tubes: if sane(&f.points, 2e-3 * size) { vec![Tube { points: f.points.clone(), radius: size / 240.0 }] } else { Vec::new() },
+        tubes: if sane(&f.points, 2e-3 * size) {
+            vec![Tube { points: f.points.clone(), radius: size / 240.0 }]
+        } else {
+            Vec::new()
+        },
         solids: Vec::new(),
         look: (DVec3::Y, DVec3::Z),
         frame: Some((DVec3::new(0.15 * size, 0.0, -0.45 * size), 1.5 * size)),
     };
-    for (size, name, title) in
-        [(15.0, "effective", "Figure 13 at the effective scale after 5 s: without DDC above, with DDC below"), (0.15, "true", "The same at true scale")]
-    {
+    for (size, name, title) in [
+        (15.0, "effective", "Figure 13 at the effective scale after 5 s: without DDC above, with DDC below"),
+        (0.15, "true", "The same at true scale"),
+    ] {
         let panels = [false, true].into_iter().flat_map(|ddc| {
             let falls = paper_of(size, ddc);
             BUDGETS

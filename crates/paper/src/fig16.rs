@@ -1,4 +1,5 @@
-//! Row E-16, figure 16: a square knot, tied around a post by both ends, let go and loaded (the sample scene `square_knot`).
+//! Row E-16, figure 16: a square knot, tied around a post by both ends, let go and loaded (the sample scene
+//! `square_knot`).
 
 use crate::led::{self, Moment, Run, SCALED, TRUE, find, verdict};
 use crate::measure::{mm, number};
@@ -10,7 +11,12 @@ use sutura::glam::DVec3;
 pub const EXPERIMENT: Experiment = Experiment { name: "fig16", title: "A square knot", figures: "16", plan };
 
 fn plan() -> Plan {
-    Plan::new(vec![()], |()| "square knot".into(), |()| led::all("square_knot", Hold::Pin, 1.0, &[30, 100], None), |found| finish(&found[0].1))
+    Plan::new(
+        vec![()],
+        |()| "square knot".into(),
+        |()| led::all("square_knot", Hold::Pin, 1.0, &[30, 100], None),
+        |found| finish(&found[0].1),
+    )
 }
 
 fn finish(runs: &[Run]) -> Outcome {
@@ -30,18 +36,33 @@ fn finish(runs: &[Run]) -> Outcome {
     out.compare.push(Compare {
         what: "16: square knot".into(),
         published: "tied, holds (picture)".into(),
-        effective: format!("{} (100 steps a frame: {})", said(find(runs, SCALED)), said(find(runs, "paper, 100 steps a frame"))),
+        effective: format!(
+            "{} (100 steps a frame: {})",
+            said(find(runs, SCALED)),
+            said(find(runs, "paper, 100 steps a frame"))
+        ),
         true_scale: said(find(runs, TRUE)),
         direct: format!("{}; slip under load {}", said(direct), mm(direct.slip)),
     });
-    let mut check = |what: String, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
-    check("direct: the knot after 11 s under load".into(), "square", knot(direct, "hold"), knot(direct, "hold") == "square");
+    let mut check =
+        |what: String, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
+    check(
+        "direct: the knot after 11 s under load".into(),
+        "square",
+        knot(direct, "hold"),
+        knot(direct, "hold") == "square",
+    );
     check("direct: slip in 10 s under load".into(), "<= 0.1 mm", mm(direct.slip), direct.slip <= 1e-4);
     check("direct: nothing passes through".into(), "none", direct.passages.to_string(), direct.passages == 0);
     check("direct: least clearance [diameters]".into(), ">= -0.05", number(direct.least()), direct.least() >= -0.05);
     let scaled = find(runs, SCALED);
     let finest = runs.last().expect("there are runs");
-    check("paper, effective scale: the knot at the end, as published".into(), "square", knot(scaled, "hold"), knot(scaled, "hold") == "square");
+    check(
+        "paper, effective scale: the knot at the end, as published".into(),
+        "square",
+        knot(scaled, "hold"),
+        knot(scaled, "hold") == "square",
+    );
     check(
         "paper, effective scale: nothing passes through, as published".into(),
         "none",

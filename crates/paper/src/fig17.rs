@@ -1,4 +1,5 @@
-//! Row E-17, figure 17: a throw around a cylinder and a spiral winding, held by friction (the sample scenes `throw_on_cylinder` and `spiral_winding`).
+//! Row E-17, figure 17: a throw around a cylinder and a spiral winding, held by friction (the sample scenes
+//! `throw_on_cylinder` and `spiral_winding`).
 
 use crate::led::{self, Moment, Run, SCALED, TRUE, find, moved};
 use crate::measure::{mm, number};
@@ -7,7 +8,8 @@ use crate::plan::{Experiment, Plan};
 use sutura::Hold;
 use sutura::glam::DVec3;
 
-pub const EXPERIMENT: Experiment = Experiment { name: "fig17", title: "A throw and a spiral winding on a cylinder", figures: "17", plan };
+pub const EXPERIMENT: Experiment =
+    Experiment { name: "fig17", title: "A throw and a spiral winding on a cylinder", figures: "17", plan };
 
 fn plan() -> Plan {
     Plan::new(
@@ -34,22 +36,48 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
             true_scale: moved(real),
             direct: moved(direct),
         });
-        let mut check = |what: String, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
+        let mut check = |what: String, bar: &str, found: String, passed: bool| {
+            out.checks.push(Check::new(what, bar, found, passed))
+        };
         check(format!("direct, {what}: drift in 3 s"), "<= 0.05 mm", mm(direct.drift), direct.drift <= 5e-5);
-        check(format!("direct, {what}: nothing passes through"), "none", direct.passages.to_string(), direct.passages == 0);
-        check(format!("direct, {what}: least clearance [diameters]"), ">= -0.05", number(direct.least()), direct.least() >= -0.05);
+        check(
+            format!("direct, {what}: nothing passes through"),
+            "none",
+            direct.passages.to_string(),
+            direct.passages == 0,
+        );
+        check(
+            format!("direct, {what}: least clearance [diameters]"),
+            ">= -0.05",
+            number(direct.least()),
+            direct.least() >= -0.05,
+        );
         check(
             format!("paper, effective scale, {what}: nothing passes through, as published"),
             "none",
             scaled.passages.to_string(),
             scaled.passages == 0 && scaled.diverged.is_none(),
         );
-        out.tables.extend([led::table(name, &format!("Runs of the {what}"), runs), led::times(&format!("{name}_times"), runs)]);
+        out.tables.extend([
+            led::table(name, &format!("Runs of the {what}"), runs),
+            led::times(&format!("{name}_times"), runs),
+        ]);
     }
-    let knots: Vec<String> =
-        throw.iter().map(|r| format!("{} {}", r.name, ["first throw", "first draw", "hold"].map(|p| r.at(p).map_or("-", |s| &*s.knot)).join(", "))).collect();
+    let knots: Vec<String> = throw
+        .iter()
+        .map(|r| {
+            format!(
+                "{} {}",
+                r.name,
+                ["first throw", "first draw", "hold"].map(|p| r.at(p).map_or("-", |s| &*s.knot)).join(", ")
+            )
+        })
+        .collect();
     out.say(format!("The knot of the throw, after it is laid, when it is drawn, at the end: {}.", knots.join("; ")));
-    let held = throw.iter().find(|r| r.name != "direct" && r.diverged.is_none()).map_or("none of these".to_string(), |r| r.name.clone());
+    let held = throw
+        .iter()
+        .find(|r| r.name != "direct" && r.diverged.is_none())
+        .map_or("none of these".to_string(), |r| r.name.clone());
     out.say(format!(
         "Why the paper's solver fails: in a step of true scale a hand of 25 cm/s moves by 19 diameters, at the effective scale by two. What comes near only while constraints are projected is seen a step later, beyond the other side; and the friction constraint \
          lifts a sphere that slid by the angle phi by 1 / cos^2 phi - 1 of its radius (theory 17), without bound toward a right angle. The first run that gets through the throw without diverging: {held}."
@@ -63,7 +91,12 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
         Moment { phase: "first draw", words: "drawn", look, at: near, width: 0.017 },
         Moment { phase: "hold", words: "held", look, at: near, width: 0.017 },
     ];
-    out.pictures.push(led::picture("throw", "The throw", &[find(throw, "direct"), find(throw, SCALED), find(throw, "paper, 30 steps a frame")], &moments));
+    out.pictures.push(led::picture(
+        "throw",
+        "The throw",
+        &[find(throw, "direct"), find(throw, SCALED), find(throw, "paper, 30 steps a frame")],
+        &moments,
+    ));
     let near = DVec3::new(0.0, 0.0, 0.002);
     let moments = [
         Moment { phase: "wind", words: "wound", look: across, at: near, width: 0.02 },
@@ -71,6 +104,11 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
         Moment { phase: "hold", words: "held", look: across, at: near, width: 0.02 },
     ];
     let finest = spiral.last().expect("there are runs");
-    out.pictures.push(led::picture("spiral", "The spiral winding", &[find(spiral, "direct"), find(spiral, SCALED), finest], &moments));
+    out.pictures.push(led::picture(
+        "spiral",
+        "The spiral winding",
+        &[find(spiral, "direct"), find(spiral, SCALED), finest],
+        &moments,
+    ));
     out
 }

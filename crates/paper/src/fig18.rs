@@ -11,7 +11,12 @@ pub const EXPERIMENT: Experiment = Experiment { name: "fig18", title: "Three thr
 
 fn plan() -> Plan {
     // They are laid without friction, which begins when they are pulled.
-    Plan::new(vec![()], |()| "twine".into(), |()| led::all("twine", Hold::Clamp, 0.5, &[30], Some("pull")), |found| finish(&found[0].1))
+    Plan::new(
+        vec![()],
+        |()| "twine".into(),
+        |()| led::all("twine", Hold::Clamp, 0.5, &[30], Some("pull")),
+        |found| finish(&found[0].1),
+    )
 }
 
 fn finish(runs: &[Run]) -> Outcome {
@@ -32,7 +37,8 @@ fn finish(runs: &[Run]) -> Outcome {
         true_scale: said(real),
         direct: said(direct),
     });
-    let mut check = |what: &str, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
+    let mut check =
+        |what: &str, bar: &str, found: String, passed: bool| out.checks.push(Check::new(what, bar, found, passed));
     check("direct: part of the particles in touch", ">= 95 %", percent(direct.touching), direct.touching >= 0.95);
     check("direct: drift in 1 s", "<= 0.001 mm", mm(direct.drift), direct.drift <= 1e-6);
     check("direct: least clearance [diameters]", ">= -0.05", number(direct.clearance[0]), direct.clearance[0] >= -0.05);

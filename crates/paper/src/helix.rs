@@ -33,8 +33,9 @@ impl Fall {
     }
 }
 
-/// A thread `size` long in `n` elements, wound about the direction in which gravity does not act, with a radius of a thirtieth of its length. For the paper's solver it is a
-/// chain of spheres that touch; for the other it is as slender as a thread of 0.3 mm and 15 cm.
+/// A thread `size` long in `n` elements, wound about the direction in which gravity does not act, with a radius of a
+/// thirtieth of its length. For the paper's solver it is a chain of spheres that touch; for the other it is as slender
+/// as a thread of 0.3 mm and 15 cm.
 fn scene(size: f64, n: usize, spheres: bool) -> Scene {
     let (r, pitch) = (size / 30.0, size / 15.0);
     let turns = size / libm::hypot(TAU * r, pitch);
@@ -48,7 +49,12 @@ fn scene(size: f64, n: usize, spheres: bool) -> Scene {
     let shape = Shape::untwisted(points, DVec3::Y);
     let radius = if spheres { 0.5 * size / n as f64 } else { 1e-3 * size };
     let rod = Rod { start: shape.clone(), rest: shape, radius, young: 2e9, shear: 2e9 / 2.8, density: 1150.0 };
-    Scene { gravity: DVec3::NEG_Z * GRAVITY, drag: DRAG, first: Hold::Pin(Box::new(move |_| DVec3::new(0.0, r, 0.0))), ..Scene::of(rod) }
+    Scene {
+        gravity: DVec3::NEG_Z * GRAVITY,
+        drag: DRAG,
+        first: Hold::Pin(Box::new(move |_| DVec3::new(0.0, r, 0.0))),
+        ..Scene::of(rod)
+    }
 }
 
 /// Lets it fall.

@@ -1,9 +1,11 @@
 //! A sample scene on Sutura's own solver, and the paper's solver led along the same way.
 //!
-//! The paper's solver knows no forces, so that it cannot draw an end until it pulls back with 2 N. What the hands do is taken from the run of the other: which places
-//! of the thread are held, for which frames, and which way each goes; also which way shapes go that a force moves. A grip takes hold of the thread where it
-//! then is, and makes the way that it makes in the other run. Threads that do not stretch cannot go the way of threads that do: ends are set back by as much as the
-//! thread is longer than at rest, or by more, so that what happens is not owed to a thread pulled longer than it is.
+//! The paper's solver knows no forces, so that it cannot draw an end until it pulls back with 2 N. What the hands do is
+//! taken from the run of the other: which places of the thread are held, for which frames, and which way each goes;
+//! also which way shapes go that a force moves. A grip takes hold of the thread where it then is, and makes the way
+//! that it makes in the other run. Threads that do not stretch cannot go the way of threads that do: ends are set back
+//! by as much as the thread is longer than at rest, or by more, so that what happens is not owed to a thread pulled
+//! longer than it is.
 
 use crate::measure::{EFFECTIVE, FRAME, length, mm, number, percent, sane};
 use crate::outcome::{Cell, Panel, Picture, Solid, Table, Tube};
@@ -12,8 +14,8 @@ use sutura::audit::Audit;
 use sutura::glam::DVec3;
 use sutura::knot::{self, Ends, Entries};
 use sutura::{
-    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, PaperSettings, Place, Pose, RodSpec, RodView, Settings, ShapeMotion, ShapeSpec, Solver,
-    View, World,
+    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, PaperSettings, Place, Pose, RodSpec, RodView,
+    Settings, ShapeMotion, ShapeSpec, Solver, View, World,
 };
 use sutura_scene::{Runner, Scene, samples};
 
@@ -152,7 +154,11 @@ impl Watch {
 }
 
 fn shot(view: View<'_>, phase: &str, tied: bool, held: bool) -> Shot {
-    let knot = view.rods().next().filter(|r| tied && sane(r.positions(), r.rest_length())).map_or_else(String::new, |r| which(&r, held));
+    let knot = view
+        .rods()
+        .next()
+        .filter(|r| tied && sane(r.positions(), r.rest_length()))
+        .map_or_else(String::new, |r| which(&r, held));
     Shot {
         phase: phase.into(),
         threads: view.rods().map(|r| (r.positions().to_vec(), r.radius())).collect(),
@@ -165,7 +171,11 @@ fn shot(view: View<'_>, phase: &str, tied: bool, held: bool) -> Shot {
 fn which(rod: &RodView<'_>, held: bool) -> String {
     let points = rod.positions();
     let middle = points.iter().sum::<DVec3>() / points.len() as f64;
-    let ends = if held { Ends::Held { start: points[0] - middle, end: points[points.len() - 1] - middle } } else { Ends::Free };
+    let ends = if held {
+        Ends::Held { start: points[0] - middle, end: points[points.len() - 1] - middle }
+    } else {
+        Ends::Free
+    };
     knot::recognize(points, ends, 1).knot.name().to_string()
 }
 
@@ -183,7 +193,11 @@ fn touching(view: View<'_>) -> f64 {
                 let t = ((*p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
                 p.distance(a.lerp(b, t)) < reach
             };
-            near += usize::from(view.rods().filter(|o| o.slot() != rod.slot()).any(|o| o.positions().windows(2).any(|w| close(w[0], w[1]))));
+            near += usize::from(
+                view.rods()
+                    .filter(|o| o.slot() != rod.slot())
+                    .any(|o| o.positions().windows(2).any(|w| close(w[0], w[1]))),
+            );
         }
     }
     near as f64 / all as f64
@@ -195,7 +209,8 @@ fn ms(mut frames: Vec<f64>) -> [f64; 2] {
     [1e3 * mean, 1e3 * frames[frames.len() / 2]]
 }
 
-/// Runs a sample scene as it is. `hold` is how its grips hold; each end of a thread is led as far as `share` of its stretch allows.
+/// Runs a sample scene as it is. `hold` is how its grips hold; each end of a thread is led as far as `share` of its
+/// stretch allows.
 pub fn direct(name: &str, hold: Hold, share: f64) -> (Lead, Run) {
     let sample = samples().iter().find(|s| s.name == name).expect("it is a sample scene");
     let scene = Scene::parse(sample.text, name).expect("sample scenes are valid");
@@ -232,7 +247,11 @@ pub fn direct(name: &str, hold: Hold, share: f64) -> (Lead, Run) {
         lead.frames.push(Hands { grips: held.clone(), shapes: view.shapes().map(|s| s.pose).collect() });
         watch.look(view, progress.phase == LAST);
         if progress.phase != phase || progress.finished {
-            let both = held.iter().filter(|h| h.arc == 0.0 || h.arc > 0.999 * view.rods().next().map_or(0.0, |r| r.rest_length())).count() >= 2;
+            let both = held
+                .iter()
+                .filter(|h| h.arc == 0.0 || h.arc > 0.999 * view.rods().next().map_or(0.0, |r| r.rest_length()))
+                .count()
+                >= 2;
             shots.push(shot(view, &phase, tied, both));
             lead.phases.push((std::mem::replace(&mut phase, progress.phase.clone()), lead.frames.len()));
         }
@@ -263,7 +282,8 @@ pub fn direct(name: &str, hold: Hold, share: f64) -> (Lead, Run) {
     (lead, run)
 }
 
-/// Where a particle is; an end of a thread that is stretched is set back along it by `share` of what the thread is longer than at rest.
+/// Where a particle is; an end of a thread that is stretched is set back along it by `share` of what the thread is
+/// longer than at rest.
 fn set_back(rod: &RodView<'_>, i: usize, share: f64) -> DVec3 {
     let p = rod.positions();
     let neighbor = match i {
@@ -292,7 +312,9 @@ fn taken(runner: &Runner, before: &[Held], share: f64) -> Vec<Held> {
     let one = |(grip, at): (usize, Option<[f32; 3]>)| {
         let at = DVec3::from(at?.map(f64::from));
         // The pose of a grip is where its particle is.
-        let all = view.rods().enumerate().flat_map(|(thread, rod)| rod.positions().iter().enumerate().map(move |(i, p)| (p.distance(at), thread, i)));
+        let all = view.rods().enumerate().flat_map(|(thread, rod)| {
+            rod.positions().iter().enumerate().map(move |(i, p)| (p.distance(at), thread, i))
+        });
         let (_, thread, i) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let rod = view.rods().nth(thread)?;
         let (arc, at) = (rod.arc(i), set_back(&rod, i, share));
@@ -302,7 +324,8 @@ fn taken(runner: &Runner, before: &[Held], share: f64) -> Vec<Held> {
     runner.frame().grips.into_iter().enumerate().filter_map(one).collect()
 }
 
-/// Leads the paper's solver along the way of a run, until it diverges; through the first three seconds of its last phase.
+/// Leads the paper's solver along the way of a run, until it diverges; through the first three seconds of its last
+/// phase.
 pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run {
     let settings = Settings {
         solver: Solver::Paper(numbers),
@@ -318,7 +341,11 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
         .shapes
         .iter()
         .zip(&lead.shape_poses)
-        .map(|(geometry, pose)| world.insert_shape(&ShapeSpec { motion: ShapeMotion::Driven, ..ShapeSpec::fixed(geometry.clone(), *pose) }).expect(GOOD))
+        .map(|(geometry, pose)| {
+            world
+                .insert_shape(&ShapeSpec { motion: ShapeMotion::Driven, ..ShapeSpec::fixed(geometry.clone(), *pose) })
+                .expect(GOOD)
+        })
         .collect();
     let tied = rods.len() == 1;
     let mut grips: Vec<(Held, Handle<Grip>, Pose)> = Vec::new();
@@ -351,7 +378,9 @@ pub fn paper(lead: &Lead, name: &str, numbers: PaperSettings, pace: Pace) -> Run
         }
         for (taken, handle, from) in &grips {
             let now = hands.grips.iter().find(|h| h.grip == taken.grip).expect("others were let go");
-            world.set_grip_pose(*handle, Pose::new(from.position + (now.at - taken.taken), from.orientation)).expect(GOOD);
+            world
+                .set_grip_pose(*handle, Pose::new(from.position + (now.at - taken.taken), from.orientation))
+                .expect(GOOD);
         }
         for (shape, pose) in shapes.iter().zip(&hands.shapes) {
             world.set_shape_pose(*shape, *pose).expect(GOOD);
@@ -410,15 +439,18 @@ fn spheres(t: &Thread, elements: &mut usize) -> RodSpec {
 /// A scene on both solvers: the run of Sutura's own, then those of the paper's.
 ///
 /// - True scale: one step in a frame of 1/60 s.
-/// - A hundredth of gravity at true scale, where there is gravity: what falls then falls as it does in a scene a hundred times as large, but hands move as many
-///   diameters in a step as before.
-/// - Effective scale: a scene a hundred times as large, under the same gravity, in which the hands are as quick as what falls, so that all takes ten times as
-///   long; ten steps where there was one (Froude's similarity: lengths as the square of times).
+/// - A hundredth of gravity at true scale, where there is gravity: what falls then falls as it does in a scene a
+///   hundred times as large, but hands move as many diameters in a step as before.
+/// - Effective scale: a scene a hundred times as large, under the same gravity, in which the hands are as quick as what
+///   falls, so that all takes ten times as long; ten steps where there was one (Froude's similarity: lengths as the
+///   square of times).
 /// - Other numbers of steps in a frame.
 pub fn all(name: &str, hold: Hold, share: f64, others: &[u32], smooth_until: Option<&'static str>) -> Vec<Run> {
     let (lead, run) = direct(name, hold, share);
     let mut runs = vec![run];
-    let mut go = |name: &str, steps: u32, gravity: f64| runs.push(paper(&lead, name, PaperSettings::default(), Pace { steps, gravity, smooth_until }));
+    let mut go = |name: &str, steps: u32, gravity: f64| {
+        runs.push(paper(&lead, name, PaperSettings::default(), Pace { steps, gravity, smooth_until }))
+    };
     go(TRUE, 1, 1.0);
     if lead.settings.gravity != DVec3::ZERO {
         go("paper, a hundredth of gravity", 1, 1.0 / EFFECTIVE);
@@ -479,14 +511,20 @@ pub fn table(name: &str, title: &str, runs: &[Run]) -> Table {
 
 /// What they cost.
 pub fn times(name: &str, runs: &[Run]) -> Table {
-    let mut t = Table::new(name, "CPU time of a frame (those that diverged: until then)", &["solver", "elements", "ms a frame, mean", "median"]).measured();
+    let mut t = Table::new(
+        name,
+        "CPU time of a frame (those that diverged: until then)",
+        &["solver", "elements", "ms a frame, mean", "median"],
+    )
+    .measured();
     for r in runs {
         t.row([r.name.clone().into(), r.elements.into(), r.ms[0].into(), r.ms[1].into()]);
     }
     t
 }
 
-/// Moments of some runs: a row for each run. One that diverged is shown as it was in the frame before. Threads are drawn thicker where they would hardly be seen.
+/// Moments of some runs: a row for each run. One that diverged is shown as it was in the frame before. Threads are
+/// drawn thicker where they would hardly be seen.
 pub fn picture(name: &str, title: &str, runs: &[&Run], moments: &[Moment]) -> Picture {
     let mut panels = Vec::new();
     for r in runs {
@@ -498,11 +536,18 @@ pub fn picture(name: &str, title: &str, runs: &[&Run], moments: &[Moment]) -> Pi
                 _ => (None, String::new()),
             };
             told |= r.at(m.phase).is_none();
-            let mut panel = Panel { label, tubes: Vec::new(), solids: Vec::new(), look: m.look, frame: Some((m.at, m.width)) };
+            let mut panel =
+                Panel { label, tubes: Vec::new(), solids: Vec::new(), look: m.look, frame: Some((m.at, m.width)) };
             if let Some(shot) = shot {
                 let good = shot.threads.iter().filter(|(p, _)| sane(p, 0.1));
-                panel.tubes = good.map(|(points, radius)| Tube { points: points.clone(), radius: radius.max(m.width / 400.0) }).collect();
-                panel.solids = shot.shapes.iter().map(|(geometry, pose)| Solid { geometry: geometry.clone(), pose: *pose }).collect();
+                panel.tubes = good
+                    .map(|(points, radius)| Tube { points: points.clone(), radius: radius.max(m.width / 400.0) })
+                    .collect();
+                panel.solids = shot
+                    .shapes
+                    .iter()
+                    .map(|(geometry, pose)| Solid { geometry: geometry.clone(), pose: *pose })
+                    .collect();
             }
             panels.push(panel);
         }

@@ -1,8 +1,10 @@
-//! The experiments of "Real-time inextensible surgical thread simulation" (International Journal of Computer Assisted Radiology and Surgery
-//! 13:1019, 2018), figures 8 to 18: run on the paper's own solver, on the methods that it compares with, and on Sutura's own solver.
+//! The experiments of "Real-time inextensible surgical thread simulation" (International Journal of Computer Assisted
+//! Radiology and Surgery 13:1019, 2018), figures 8 to 18: run on the paper's own solver, on the methods that it
+//! compares with, and on Sutura's own solver.
 //!
-//! [`experiments`] lists them, [`run`] runs them side by side, [`page`] writes what was found as one page. Everything found is data; drawing and
-//! files are the caller's. What is found depends on nothing but the code; times do, and are kept apart ([`Table::measured`]).
+//! [`experiments`] lists them, [`run`] runs them side by side, [`page`] writes what was found as one page. Everything
+//! found is data; drawing and files are the caller's. What is found depends on nothing but the code; times do, and are
+//! kept apart ([`Table::measured`]).
 
 mod fig08;
 mod fig09;

@@ -1,4 +1,5 @@
-//! Rows F-1 to F-4: what the paper says is missing from its method. Stiffness over budget and elements, moduli in Pa, forces against theory, Coulomb's law.
+//! Rows F-1 to F-4: what the paper says is missing from its method. Stiffness over budget and elements, moduli in Pa,
+//! forces against theory, Coulomb's law.
 //!
 //! Cases of forces and friction are those of `sutura-validate`, whose references are used throughout.
 
@@ -14,7 +15,8 @@ use sutura_scene::{Runner, Scene as SceneFile};
 use sutura_validate::reference::{elastica, material::T1};
 use sutura_validate::{Section, scene_text, sections};
 
-pub const EXPERIMENT: Experiment = Experiment { name: "limits", title: "What the paper says is missing", figures: "", plan };
+pub const EXPERIMENT: Experiment =
+    Experiment { name: "limits", title: "What the paper says is missing", figures: "", plan };
 
 /// Elements where they are not varied.
 const N: usize = 40;
@@ -32,14 +34,23 @@ fn paper(iterations: u32, steps: u32) -> Method {
 }
 
 fn pber(iterations: usize, substeps: usize) -> Method {
-    Method::Pber(pber::Settings { substeps, iterations, bend_twist: DVec3::new(0.05, 0.05, 0.25), ..Default::default() })
+    Method::Pber(pber::Settings {
+        substeps,
+        iterations,
+        bend_twist: DVec3::new(0.05, 0.05, 0.25),
+        ..Default::default()
+    })
 }
 
-/// A level thread, clamped at one end, of the given length from the middle of the held element on: refinement converges to one rod.
+/// A level thread, clamped at one end, of the given length from the middle of the held element on: refinement converges
+/// to one rod.
 fn cantilever(length: f64, n: usize, gravity: f64, drag: f64) -> Scene {
     let l = length / (n as f64 - 0.5);
     let (shape, frame) = level(-0.5 * l, length, n);
-    Scene { first: Hold::Clamp(Box::new(move |_| Pose::new(DVec3::NEG_X * (0.5 * l), frame))), ..scene(thread(shape.clone(), shape), gravity, drag) }
+    Scene {
+        first: Hold::Clamp(Box::new(move |_| Pose::new(DVec3::NEG_X * (0.5 * l), frame))),
+        ..scene(thread(shape.clone(), shape), gravity, drag)
+    }
 }
 
 /// Drop of the tip over the length after `frames`; not a number where it diverges.
@@ -124,10 +135,21 @@ fn stiffness_found(found: &[(Droop, f64)]) -> Outcome {
             Vary::Steps => "steps",
             Vary::Elements => "elements",
         };
-        table.row([word.into(), c.method.name().into(), c.n.into(), c.method.budget().into(), (*d).into(), percent(d / exact - 1.0).into()]);
+        table.row([
+            word.into(),
+            c.method.name().into(),
+            c.n.into(),
+            c.method.budget().into(),
+            (*d).into(),
+            percent(d / exact - 1.0).into(),
+        ]);
     }
     let of = |vary: Vary, name: &str| -> Vec<(f64, f64)> {
-        found.iter().filter(|(c, d)| c.vary == vary && c.method.name() == name && d.is_finite()).map(|(c, d)| (c.value as f64, *d)).collect()
+        found
+            .iter()
+            .filter(|(c, d)| c.vary == vary && c.method.name() == name && d.is_finite())
+            .map(|(c, d)| (c.value as f64, *d))
+            .collect()
     };
     let range = |vary: Vary, name: &str| {
         let p = of(vary, name);
@@ -139,15 +161,21 @@ fn stiffness_found(found: &[(Droop, f64)]) -> Outcome {
         (Vary::Steps, "steps", "steps in a frame of 1/60 s"),
         (Vary::Elements, "elements", "elements"),
     ] {
-        let mut plot =
-            Plot::new(name, &format!("F-1: drop of a cantilever at rest over {axis}"), Axis::log(axis, ""), Axis::new("drop of the tip / length", ""));
+        let mut plot = Plot::new(
+            name,
+            &format!("F-1: drop of a cantilever at rest over {axis}"),
+            Axis::log(axis, ""),
+            Axis::new("drop of the tip / length", ""),
+        );
         for m in ["direct", "paper", "PBER"] {
             plot.line(m, of(vary, m));
         }
         plot.marks.push(("elastica".into(), exact));
         out.plots.push(plot);
     }
-    let off = |vary: Vary, from: f64| of(vary, "direct").iter().filter(|p| p.0 >= from).map(|p| (p.1 / exact - 1.0).abs()).fold(0.0, f64::max);
+    let off = |vary: Vary, from: f64| {
+        of(vary, "direct").iter().filter(|p| p.0 >= from).map(|p| (p.1 / exact - 1.0).abs()).fold(0.0, f64::max)
+    };
     let count = |vary: Vary| of(vary, "direct").len();
     for (what, vary, from, n) in [
         ("1 to 40 Newton iterations", Vary::Iterations, 0.0, 6),
@@ -175,7 +203,10 @@ fn stiffness_found(found: &[(Droop, f64)]) -> Outcome {
         range(Vary::Steps, "PBER"),
         range(Vary::Elements, "PBER"),
     ));
-    let diverges = found.iter().find(|(c, d)| c.vary == Vary::Steps && c.value == 1 && c.method.name() == "paper" && !d.is_finite()).is_some();
+    let diverges = found
+        .iter()
+        .find(|(c, d)| c.vary == Vary::Steps && c.value == 1 && c.method.name() == "paper" && !d.is_finite())
+        .is_some();
     out.compare.push(Compare {
         what: "F-1: drop of a cantilever / length, 5 to 160 iterations (elastica ".to_string() + &number(exact) + ")",
         published: "depends on iterations (stated)".into(),
@@ -234,20 +265,34 @@ fn moduli() -> Plan {
 
 fn moduli_found(found: &[(Tip, f64)]) -> Outcome {
     let mut out = Outcome::default();
-    let mut plot = Plot::new("moduli", "F-2: drop of a cantilever under a load at its tip", Axis::log("load", "N"), Axis::new("drop of the tip / length", ""));
-    let mut table =
-        Table::new("moduli", "F-2: drop of the tip over the length", &["method", "modulus [GPa]", "load [N]", "P L^2 / EI", "drop / length", "elastica"])
-            .hidden();
+    let mut plot = Plot::new(
+        "moduli",
+        "F-2: drop of a cantilever under a load at its tip",
+        Axis::log("load", "N"),
+        Axis::new("drop of the tip / length", ""),
+    );
+    let mut table = Table::new(
+        "moduli",
+        "F-2: drop of the tip over the length",
+        &["method", "modulus [GPa]", "load [N]", "P L^2 / EI", "drop / length", "elastica"],
+    )
+    .hidden();
     let mut worst = 0.0_f64;
     for young in MODULI {
         let to_load = |k: f64| k * stiff(young) / (SHORT * SHORT);
-        let exact = (0..=60).map(|i| libm::pow(10.0, -1.3 + 2.6 * f64::from(i) / 60.0)).map(|k| (to_load(k), elastica::tip_load(k)[1]));
+        let exact = (0..=60)
+            .map(|i| libm::pow(10.0, -1.3 + 2.6 * f64::from(i) / 60.0))
+            .map(|k| (to_load(k), elastica::tip_load(k)[1]));
         plot.line(format!("elastica, {} GPa", number(1e-9 * young)), exact.collect());
         let own = found.iter().filter(|(c, _)| c.young == young && c.method.name() == "direct");
         plot.dots(format!("direct, {} GPa", number(1e-9 * young)), own.map(|(c, d)| (c.force, *d)).collect());
     }
     let of_paper = |young: f64| -> Vec<(f64, f64)> {
-        found.iter().filter(|(c, d)| c.young == young && c.method.name() == "paper" && *d < LONGER).map(|(c, d)| (c.force, *d)).collect()
+        found
+            .iter()
+            .filter(|(c, d)| c.young == young && c.method.name() == "paper" && *d < LONGER)
+            .map(|(c, d)| (c.force, *d))
+            .collect()
     };
     plot.line("paper, any modulus", of_paper(MODULI[0]));
     for young in &MODULI[1..] {
@@ -256,7 +301,14 @@ fn moduli_found(found: &[(Tip, f64)]) -> Outcome {
     for (c, d) in found {
         let k = c.force * SHORT * SHORT / stiff(c.young);
         let exact = elastica::tip_load(k)[1];
-        table.row([c.method.name().into(), (1e-9 * c.young).into(), c.force.into(), k.into(), (*d).into(), exact.into()]);
+        table.row([
+            c.method.name().into(),
+            (1e-9 * c.young).into(),
+            c.force.into(),
+            k.into(),
+            (*d).into(),
+            exact.into(),
+        ]);
         if c.method.name() == "direct" {
             worst = worst.max(if d.is_finite() { (d / exact - 1.0).abs() } else { f64::INFINITY });
         }
@@ -268,7 +320,12 @@ fn moduli_found(found: &[(Tip, f64)]) -> Outcome {
         percent(worst),
         worst <= 0.01,
     ));
-    out.checks.push(Check::new("F-2, paper: the drop does not know the modulus", "the same bits", if same { "the same" } else { "differs" }, same));
+    out.checks.push(Check::new(
+        "F-2, paper: the drop does not know the modulus",
+        "the same bits",
+        if same { "the same" } else { "differs" },
+        same,
+    ));
     out.say(format!(
         "**F-2, moduli.** A thread of 0.3 mm and 5 cm with a dead load at its tip, 0.1, 1 and 10 GPa: *direct* is within {} of the elastica (elliptic integrals) at every modulus and load. To the paper's solver the modulus \
          does not exist: its curve is one for all (20 iterations, ten steps a frame). From {} N on the load pulls it longer than it is, or it diverges.",
@@ -299,7 +356,11 @@ fn validated(number: u32, name: &str) -> Vec<(String, f64, f64)> {
     let level = study.levels.last().expect(THERE);
     let settings: Vec<(String, String)> = study.settings.iter().chain(&level.settings).cloned().collect();
     let outcome = run(study.scene, &settings);
-    study.quantities.iter().map(|q| (q.name.clone(), (q.measure)(&outcome), q.reference.last().copied().unwrap_or(f64::NAN))).collect()
+    study
+        .quantities
+        .iter()
+        .map(|q| (q.name.clone(), (q.measure)(&outcome), q.reference.last().copied().unwrap_or(f64::NAN)))
+        .collect()
 }
 
 fn run(scene: &str, settings: &[(String, String)]) -> sutura_scene::Outcome {
@@ -332,7 +393,12 @@ enum Force {
 const TWISTED: f64 = 0.1;
 
 fn forces() -> Plan {
-    let cases: Vec<Force> = SHORTENED.map(Force::Column).into_iter().chain(SPANS.map(Force::Chain)).chain([1.0, 3.0, 6.0, 8.0].map(Force::Twist)).collect();
+    let cases: Vec<Force> = SHORTENED
+        .map(Force::Column)
+        .into_iter()
+        .chain(SPANS.map(Force::Chain))
+        .chain([1.0, 3.0, 6.0, 8.0].map(Force::Twist))
+        .collect();
     let label = |c: &Force| match c {
         Force::Column(e) => format!("F-3: column shortened by {e}"),
         Force::Chain(s) => format!("F-3: chain, span {s}"),
@@ -351,14 +417,20 @@ fn forces() -> Plan {
 
 /// Torque at the end of a straight rod between two clamps \[N m\].
 fn torque(angle: f64) -> f64 {
-    let settings = [("phase.twist.action[0].keys[0].turn.angle", format!("{angle:e}")), ("grip.left.force", "0.01".into())].map(|(k, v)| (k.to_string(), v));
+    let settings =
+        [("phase.twist.action[0].keys[0].turn.angle", format!("{angle:e}")), ("grip.left.force", "0.01".into())]
+            .map(|(k, v)| (k.to_string(), v));
     let outcome = run("twisted", &settings);
     outcome.report.probes.iter().find(|p| p.name == "torque").map_or(f64::NAN, |p| p.last)
 }
 
 fn forces_found(found: &[(Force, Vec<(f64, f64)>)]) -> Outcome {
     let mut out = Outcome::default();
-    let mut table = Table::new("forces", "F-3: forces that direct reads, against theory", &["case", "what", "read", "theory", "error"]);
+    let mut table = Table::new(
+        "forces",
+        "F-3: forces that direct reads, against theory",
+        &["case", "what", "read", "theory", "error"],
+    );
     let mut worst = [0.0_f64; 3];
     let (mut loads, mut sides, mut tensions) = (Vec::new(), Vec::new(), Vec::new());
     for (c, q) in found {
@@ -370,7 +442,11 @@ fn forces_found(found: &[(Force, Vec<(f64, f64)>)]) -> Outcome {
             Force::Chain(s) => {
                 sides.push((*s, q[0].0));
                 tensions.push((*s, q[1].0));
-                (1, format!("thread hung between pins, span {s} of its length"), &["horizontal force over weight", "tension at the pin over weight"])
+                (
+                    1,
+                    format!("thread hung between pins, span {s} of its length"),
+                    &["horizontal force over weight", "tension at the pin over weight"],
+                )
             }
             Force::Twist(a) => (2, format!("rod between clamps turned by {a} rad"), &["torque [N m]"]),
         };
@@ -380,20 +456,42 @@ fn forces_found(found: &[(Force, Vec<(f64, f64)>)]) -> Outcome {
             table.row([case.clone().into(), (*name).into(), (*read).into(), (*theory).into(), percent(error).into()]);
         }
     }
-    for (what, e) in
-        ["load of a buckled column against the elastica", "forces of a hanging thread against its closed form", "torque of a twisted rod against G J / L"]
-            .iter()
-            .zip(worst)
+    for (what, e) in [
+        "load of a buckled column against the elastica",
+        "forces of a hanging thread against its closed form",
+        "torque of a twisted rod against G J / L",
+    ]
+    .iter()
+    .zip(worst)
     {
         out.checks.push(Check::new(format!("F-3, direct: {what}"), "within 1 %", percent(e), e <= 0.01));
     }
-    let mut plot =
-        Plot::new("column", "F-3: load of a column whose ends come together", Axis::new("shortening / length", ""), Axis::new("load / Euler's load", ""));
-    plot.line("elastica", std::iter::once((0.0, 1.0)).chain((1..=55).map(|i| 0.01 * f64::from(i)).map(|e| (e, elastica::buckled(e)[0]))).collect());
+    let mut plot = Plot::new(
+        "column",
+        "F-3: load of a column whose ends come together",
+        Axis::new("shortening / length", ""),
+        Axis::new("load / Euler's load", ""),
+    );
+    plot.line(
+        "elastica",
+        std::iter::once((0.0, 1.0))
+            .chain((1..=55).map(|i| 0.01 * f64::from(i)).map(|e| (e, elastica::buckled(e)[0])))
+            .collect(),
+    );
     plot.dots("direct", loads);
     out.plots.push(plot);
-    let mut plot = Plot::new("hanging", "F-3: forces of a thread hung between two pins", Axis::new("span / length", ""), Axis::new("force / weight", ""));
-    let catenary = |k: usize| (25..=97).map(|i| 0.01 * f64::from(i)).map(|s| (s, sutura_validate::reference::catenary::level(s)[k])).collect::<Vec<_>>();
+    let mut plot = Plot::new(
+        "hanging",
+        "F-3: forces of a thread hung between two pins",
+        Axis::new("span / length", ""),
+        Axis::new("force / weight", ""),
+    );
+    let catenary = |k: usize| {
+        (25..=97)
+            .map(|i| 0.01 * f64::from(i))
+            .map(|s| (s, sutura_validate::reference::catenary::level(s)[k]))
+            .collect::<Vec<_>>()
+    };
     plot.line("catenary, horizontal", catenary(1));
     plot.dots("direct, horizontal", sides);
     plot.line("catenary, tension at the pins", catenary(2));
@@ -444,17 +542,22 @@ fn friction() -> Plan {
     cases.extend(AROUND.map(|(mu, degrees)| Rub::Capstan(mu, degrees)));
     let label = |c: &Rub| match c {
         Rub::Incline(a, None) => format!("F-4: direct, incline of {a} degrees"),
-        Rub::Incline(a, Some((k, h))) => format!("F-4: paper, k = {k}, steps of {} ms, incline of {a} degrees", number(1e3 * h)),
+        Rub::Incline(a, Some((k, h))) => {
+            format!("F-4: paper, k = {k}, steps of {} ms, incline of {a} degrees", number(1e3 * h))
+        }
         Rub::Capstan(mu, d) => format!("F-4: capstan, mu = {mu}, {d} degrees"),
     };
     let run = |c: &Rub| match c {
-        Rub::Incline(a, paper) => (slide(*a, *paper), (GRAVITY * (a.to_radians().sin() - MU * a.to_radians().cos())).max(0.0)),
+        Rub::Incline(a, paper) => {
+            (slide(*a, *paper), (GRAVITY * (a.to_radians().sin() - MU * a.to_radians().cos())).max(0.0))
+        }
         Rub::Capstan(mu, d) => quantity(&validated(9, &format!("mu = {mu}, {d} degrees")), "T2 / T1"),
     };
     Plan::new(cases, label, run, friction_found)
 }
 
-/// Acceleration down the incline, from the way in the last half second \[m/s^2\]: `n` steps of length h make the way a h^2 n (n + 1) / 2.
+/// Acceleration down the incline, from the way in the last half second \[m/s^2\]: `n` steps of length h make the way a
+/// h^2 n (n + 1) / 2.
 fn slide(degrees: f64, paper: Option<(f64, f64)>) -> f64 {
     let (s, c) = libm::sincos(degrees.to_radians());
     let h = paper.map_or(FINE, |p| p.1);
@@ -464,7 +567,10 @@ fn slide(degrees: f64, paper: Option<(f64, f64)>) -> f64 {
         ("solver.substep".to_string(), format!("{:e}", h * (1.0 + 1e-9))),
     ];
     if let Some((k, _)) = paper {
-        settings.extend([("solver.method".to_string(), "paper".to_string()), ("solver.paper.friction".to_string(), k.to_string())]);
+        settings.extend([
+            ("solver.method".to_string(), "paper".to_string()),
+            ("solver.paper.friction".to_string(), k.to_string()),
+        ]);
     }
     let outcome = run("incline", &settings);
     let Some(place) = outcome.series.iter().find(|s| s.name == "place") else { return f64::NAN };
@@ -477,7 +583,8 @@ fn slide(degrees: f64, paper: Option<(f64, f64)>) -> f64 {
 
 fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
     let mut out = Outcome::default();
-    let mut table = Table::new("friction", "F-4: friction against Coulomb's law", &["case", "solver", "found", "Coulomb"]);
+    let mut table =
+        Table::new("friction", "F-4: friction against Coulomb's law", &["case", "solver", "found", "Coulomb"]);
     let (mut inclines, mut capstans) = (Vec::new(), Vec::new());
     // By factor and step.
     let mut papers: Vec<(Pair, Vec<Pair>)> = Vec::new();
@@ -500,7 +607,10 @@ fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
                     Some(l) => l.1.push((*a, *got)),
                     None => papers.push((*p, vec![(*a, *got)])),
                 }
-                (format!("acceleration on an incline of {a} degrees [m/s^2]"), format!("paper, k = {}, steps of {} ms", p.0, number(1e3 * p.1)))
+                (
+                    format!("acceleration on an incline of {a} degrees [m/s^2]"),
+                    format!("paper, k = {}, steps of {} ms", p.0, number(1e3 * p.1)),
+                )
             }
             Rub::Capstan(mu, degrees) => {
                 capstans.push((mu * degrees.to_radians(), *got));
@@ -516,10 +626,25 @@ fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
         percent(sliding),
         sliding <= 0.01,
     ));
-    out.checks.push(Check::new("F-4, direct: acceleration below the angle of friction (16.7 degrees) [m/s^2]", "<= 1e-5", number(resting), resting <= 1e-5));
-    out.checks.push(Check::new("F-4, direct: ratio of tensions round a cylinder against exp(mu phi)", "within 1 %", percent(ratio), ratio <= 0.01));
+    out.checks.push(Check::new(
+        "F-4, direct: acceleration below the angle of friction (16.7 degrees) [m/s^2]",
+        "<= 1e-5",
+        number(resting),
+        resting <= 1e-5,
+    ));
+    out.checks.push(Check::new(
+        "F-4, direct: ratio of tensions round a cylinder against exp(mu phi)",
+        "within 1 %",
+        percent(ratio),
+        ratio <= 0.01,
+    ));
 
-    let mut plot = Plot::new("incline", "F-4: thread on an incline, mu = 0.3", Axis::new("angle", "degrees"), Axis::new("acceleration", "m/s^2"));
+    let mut plot = Plot::new(
+        "incline",
+        "F-4: thread on an incline, mu = 0.3",
+        Axis::new("angle", "degrees"),
+        Axis::new("acceleration", "m/s^2"),
+    );
     let law = |a: f64| (GRAVITY * (a.to_radians().sin() - MU * a.to_radians().cos())).max(0.0);
     plot.line("Coulomb", (0..=60).map(|i| 0.5 * f64::from(i)).map(|a| (a, law(a))).collect());
     plot.dots("direct", inclines);
@@ -528,12 +653,21 @@ fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
     }
     out.plots.push(plot);
     capstans.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut plot = Plot::new("capstan", "F-4: ratio of tensions of a thread that slides round a cylinder", Axis::new("mu phi", ""), Axis::new("T2 / T1", ""));
+    let mut plot = Plot::new(
+        "capstan",
+        "F-4: ratio of tensions of a thread that slides round a cylinder",
+        Axis::new("mu phi", ""),
+        Axis::new("T2 / T1", ""),
+    );
     plot.line("exp(mu phi)", (0..=50).map(|i| 0.04 * f64::from(i)).map(|x| (x, libm::exp(x))).collect());
     plot.dots("direct", capstans);
     out.plots.push(plot);
-    let at = |k: f64, h: f64, a: f64| papers.iter().find(|l| l.0 == (k, h)).and_then(|l| l.1.iter().find(|p| p.0 == a)).map_or(f64::NAN, |p| p.1);
-    let of = |h: f64, a: f64, ks: &[f64]| ks.iter().map(|k| format!("{} (k = {k})", number(at(*k, h, a)))).collect::<Vec<_>>().join(", ");
+    let at = |k: f64, h: f64, a: f64| {
+        papers.iter().find(|l| l.0 == (k, h)).and_then(|l| l.1.iter().find(|p| p.0 == a)).map_or(f64::NAN, |p| p.1)
+    };
+    let of = |h: f64, a: f64, ks: &[f64]| {
+        ks.iter().map(|k| format!("{} (k = {k})", number(at(*k, h, a)))).collect::<Vec<_>>().join(", ")
+    };
     let ks = [0.0, 0.01, 0.1, 1.0];
     out.say(format!(
         "**F-4, Coulomb's law.** A thread on a plane with mu = 0.3 that tilts: *direct* rests below 16.7 degrees and slides above with g (sin - mu cos) to {}; round a cylinder tensions are in the ratio of the capstan to {}. \
@@ -552,7 +686,9 @@ fn friction_found(found: &[(Rub, (f64, f64))]) -> Outcome {
         published: "not Coulomb's (stated)".into(),
         effective: of(TENTH, 20.0, &ks[1..]),
         true_scale: of(FRAME, 20.0, &ks[2..]),
-        direct: number(found.iter().find(|(c, _)| matches!(c, Rub::Incline(a, None) if *a == 20.0)).map_or(f64::NAN, |f| f.1.0)),
+        direct: number(
+            found.iter().find(|(c, _)| matches!(c, Rub::Incline(a, None) if *a == 20.0)).map_or(f64::NAN, |f| f.1.0),
+        ),
     });
     out.tables.push(table);
     out

@@ -11,8 +11,8 @@ pub const FRAME: f64 = 1.0 / 60.0;
 pub const LENGTH: f64 = 0.15;
 /// Gravity \[m/s^2\].
 pub const GRAVITY: f64 = 9.81;
-/// The size at which the published numbers come out, over the true size (15 m for 15 cm). The paper's solver knows lengths only by g dt^2 over
-/// them: a hundredth of gravity at true size is the same to it.
+/// The size at which the published numbers come out, over the true size (15 m for 15 cm). The paper's solver knows
+/// lengths only by g dt^2 over them: a hundredth of gravity at true size is the same to it.
 pub const EFFECTIVE: f64 = 100.0;
 
 /// A thread of 0.3 mm, 2 GPa, Poisson's ratio 0.4: a monofilament of size 2-0 or so. The paper names neither.
@@ -27,7 +27,8 @@ pub fn level(from: f64, to: f64, n: usize) -> (Shape, DQuat) {
     (shape, frame)
 }
 
-/// Frame by frame until `until` \[s\]; the median CPU time of a frame \[ms\]. `look` sees the state after each frame, outside of the time.
+/// Frame by frame until `until` \[s\]; the median CPU time of a frame \[ms\]. `look` sees the state after each frame,
+/// outside of the time.
 pub fn play(solver: &mut dyn Solver, frame: f64, frames: usize, mut look: impl FnMut(usize, &dyn Solver)) -> f64 {
     let mut ms = Vec::with_capacity(frames);
     for k in 1..=frames {
@@ -55,7 +56,8 @@ pub fn sane(points: &[DVec3], size: f64) -> bool {
     points.iter().all(|p| p.is_finite() && p.length() < 1e3 * size)
 }
 
-/// Out-of-plane distance about the axis x: of all planes through the axis, the one is taken from which the farthest point is nearest.
+/// Out-of-plane distance about the axis x: of all planes through the axis, the one is taken from which the farthest
+/// point is nearest.
 pub fn out_of_plane(points: &[DVec3]) -> f64 {
     let widest = |turn: f64| {
         let (s, c) = libm::sincos(turn);
@@ -161,6 +163,9 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        assert_eq!([number(0.123456), number(12345.6), number(1e-7), number(0.0), percent(0.032)], ["0.123", "12346", "1.0e-7", "0", "3.2 %"]);
+        assert_eq!(
+            [number(0.123456), number(12345.6), number(1e-7), number(0.0), percent(0.032)],
+            ["0.123", "12346", "1.0e-7", "0", "3.2 %"]
+        );
     }
 }

@@ -1,7 +1,10 @@
 //! The solvers, behind one interface: that of the rivals. A thread for one is a thread for all.
 
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Grip, GripSpec, Handle, Integrator, Material, PaperSettings, Place, Pose, RestShape, Rod, RodSpec, Settings, Shear, Stretch, SweepOrder, World};
+use sutura::{
+    Grip, GripSpec, Handle, Integrator, Material, PaperSettings, Place, Pose, RestShape, Rod, RodSpec, Settings, Shear,
+    Stretch, SweepOrder, World,
+};
 use sutura_rivals::{Der, Hold, Pbd, Pber, Scene, Solver, der, pbd, pber};
 
 /// A solver with its settings.
@@ -101,12 +104,15 @@ impl Ours {
     /// The scene in a world with one of the engine's solvers.
     pub fn new(scene: Scene, method: &Method) -> Ours {
         let fade = -libm::expm1(-scene.drag);
-        let base = Settings { gravity: scene.gravity, linear_damping: fade, angular_damping: fade, ..Settings::default() };
+        let base =
+            Settings { gravity: scene.gravity, linear_damping: fade, angular_damping: fade, ..Settings::default() };
         let (settings, substeps, stretch) = match method {
             Method::Paper(p, n) => (Settings { solver: sutura::Solver::Paper(*p), ..base }, *n, Stretch::Elastic),
-            Method::Direct(d) => {
-                (Settings { newton_max: d.newton_max, tolerance: d.tolerance, integrator: d.integrator, ..base }, d.substeps, Stretch::Inextensible)
-            }
+            Method::Direct(d) => (
+                Settings { newton_max: d.newton_max, tolerance: d.tolerance, integrator: d.integrator, ..base },
+                d.substeps,
+                Stretch::Inextensible,
+            ),
             _ => unreachable!("the others are no solvers of the engine"),
         };
         let mut world = World::new(settings).expect("settings of the experiments are valid");
@@ -127,7 +133,9 @@ impl Ours {
         let rod = world.insert_rod(&spec).expect("threads of the experiments are valid");
         let n = rest.len();
         let mut grips = Vec::new();
-        for (place, hold, half) in [(Place::Start, scene.first, 0.5 * rest[0]), (Place::End, scene.last, -0.5 * rest[n - 1])] {
+        for (place, hold, half) in
+            [(Place::Start, scene.first, 0.5 * rest[0]), (Place::End, scene.last, -0.5 * rest[n - 1])]
+        {
             let kind = match &hold {
                 Hold::Free => continue,
                 Hold::Pin(_) => sutura::Hold::Pin,

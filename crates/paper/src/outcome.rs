@@ -187,7 +187,9 @@ impl Table {
     }
     /// As comma-separated text. Numbers are written so that they read back as they are.
     pub fn csv(&self) -> String {
-        let quoted = |t: &str| if t.contains([',', '"', '\n']) { format!("\"{}\"", t.replace('"', "\"\"")) } else { t.to_string() };
+        let quoted = |t: &str| {
+            if t.contains([',', '"', '\n']) { format!("\"{}\"", t.replace('"', "\"\"")) } else { t.to_string() }
+        };
         let line = |cells: Vec<String>| cells.join(",") + "\n";
         let cell = |c: &Cell| match c {
             Cell::Word(w) => quoted(w),

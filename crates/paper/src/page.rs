@@ -21,7 +21,8 @@ pub fn page(results: &[Result], made: &str, file: &dyn Fn(&str, &str) -> String)
     if !compares.is_empty() {
         out.push_str("| figure | the paper reports | `paper`, effective scale | `paper`, true scale | `direct`, true scale |\n|---|---|---|---|---|\n");
         for c in compares {
-            let _ = writeln!(out, "| {} | {} | {} | {} | {} |", c.what, c.published, c.effective, c.true_scale, c.direct);
+            let _ =
+                writeln!(out, "| {} | {} | {} | {} | {} |", c.what, c.published, c.effective, c.true_scale, c.direct);
         }
         out.push('\n');
     }
@@ -30,7 +31,14 @@ pub fn page(results: &[Result], made: &str, file: &dyn Fn(&str, &str) -> String)
         if !r.outcome.checks.is_empty() {
             out.push_str("| asked for | bar | found | |\n|---|---|---|---|\n");
             for c in &r.outcome.checks {
-                let _ = writeln!(out, "| {} | {} | {} | {} |", c.what, c.bar, c.found, if c.passed { "yes" } else { "**NO**" });
+                let _ = writeln!(
+                    out,
+                    "| {} | {} | {} | {} |",
+                    c.what,
+                    c.bar,
+                    c.found,
+                    if c.passed { "yes" } else { "**NO**" }
+                );
             }
             out.push('\n');
         }

@@ -110,7 +110,8 @@ impl Outcome {
 /// Runs the experiments on `jobs` threads; `tell` hears of each case as it is done.
 pub fn run(experiments: &[Experiment], jobs: usize, tell: &(dyn Fn(&Progress) + Sync)) -> Vec<Result> {
     let plans: Vec<Plan> = experiments.iter().map(|e| (e.plan)()).collect();
-    let work: Vec<(&str, &Case)> = experiments.iter().zip(&plans).flat_map(|(e, plan)| plan.cases.iter().map(|c| (e.name, c))).collect();
+    let work: Vec<(&str, &Case)> =
+        experiments.iter().zip(&plans).flat_map(|(e, plan)| plan.cases.iter().map(|c| (e.name, c))).collect();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let answers: Vec<Mutex<Option<(Answer, f64)>>> = work.iter().map(|_| Mutex::default()).collect();
     std::thread::scope(|scope| {
@@ -134,7 +135,13 @@ pub fn run(experiments: &[Experiment], jobs: usize, tell: &(dyn Fn(&Progress) + 
     let mut results = Vec::new();
     for (e, plan) in experiments.iter().zip(plans) {
         let (own, seconds): (Vec<Answer>, Vec<f64>) = answers.by_ref().take(plan.cases.len()).unzip();
-        results.push(Result { name: e.name, title: e.title, figures: e.figures, outcome: (plan.finish)(own), seconds: seconds.iter().sum() });
+        results.push(Result {
+            name: e.name,
+            title: e.title,
+            figures: e.figures,
+            outcome: (plan.finish)(own),
+            seconds: seconds.iter().sum(),
+        });
     }
     results
 }

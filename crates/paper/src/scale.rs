@@ -1,4 +1,5 @@
-//! The verdict on scale: where the published method keeps its length, over size, substeps, iterations and elements; and the same for the direct solver.
+//! The verdict on scale: where the published method keeps its length, over size, substeps, iterations and elements; and
+//! the same for the direct solver.
 
 use crate::helix::{Fall, direct, fall, paper};
 use crate::measure::percent;
@@ -34,11 +35,18 @@ fn plan() -> Plan {
         for size in SIZES {
             for substeps in SUBSTEPS {
                 cases.extend(budgets.map(|iterations| Case { size, substeps, iterations, n: AT.1, ours }));
-                cases.extend(ELEMENTS.into_iter().filter(|n| *n != AT.1).map(|n| Case { size, substeps, iterations: at, n, ours }));
+                cases.extend(ELEMENTS.into_iter().filter(|n| *n != AT.1).map(|n| Case {
+                    size,
+                    substeps,
+                    iterations: at,
+                    n,
+                    ours,
+                }));
             }
         }
     }
-    let method = |c: &Case| if c.ours { direct(c.substeps, c.iterations) } else { paper(c.iterations, true, c.substeps) };
+    let method =
+        |c: &Case| if c.ours { direct(c.substeps, c.iterations) } else { paper(c.iterations, true, c.substeps) };
     let label = move |c: &Case| format!("{}, {} elements, {} m", describe(&method(c)), c.n, c.size);
     Plan::new(cases, label, move |c| fall(&method(c), c.size, c.n), finish)
 }
@@ -50,7 +58,9 @@ fn describe(m: &Method) -> String {
 fn finish(found: &[(Case, Fall)]) -> Outcome {
     let mut out = Outcome::default();
     let at = |ours: bool, size: f64, substeps: u32, iterations: u32, n: usize| {
-        let same = |c: &Case| c.ours == ours && c.size == size && c.substeps == substeps && c.iterations == iterations && c.n == n;
+        let same = |c: &Case| {
+            c.ours == ours && c.size == size && c.substeps == substeps && c.iterations == iterations && c.n == n
+        };
         &found.iter().find(|(c, _)| same(c)).expect("it was run").1
     };
     let rows: Vec<(f64, u32)> = SIZES.into_iter().flat_map(|size| SUBSTEPS.map(|s| (size, s))).collect();
@@ -76,15 +86,31 @@ fn finish(found: &[(Case, Fall)]) -> Outcome {
     let words = |v: &[u32]| v.iter().map(u32::to_string).collect::<Vec<_>>();
     let counts = || ELEMENTS.iter().map(usize::to_string).collect::<Vec<_>>();
     out.grids = vec![
-        grid("paper with DDC, 120 elements", "iterations", words(&ITERATIONS), &|size, s, k| mark(at(false, size, s, ITERATIONS[k], AT.1))),
-        grid("paper with DDC, 20 iterations", "elements", counts(), &|size, s, k| mark(at(false, size, s, AT.0, ELEMENTS[k]))),
-        grid("direct, 120 elements", "Newton iterations allowed", words(&NEWTON), &|size, s, k| mark(at(true, size, s, NEWTON[k], AT.1))),
-        grid("direct, 12 Newton iterations allowed", "elements", counts(), &|size, s, k| mark(at(true, size, s, 12, ELEMENTS[k]))),
+        grid("paper with DDC, 120 elements", "iterations", words(&ITERATIONS), &|size, s, k| {
+            mark(at(false, size, s, ITERATIONS[k], AT.1))
+        }),
+        grid("paper with DDC, 20 iterations", "elements", counts(), &|size, s, k| {
+            mark(at(false, size, s, AT.0, ELEMENTS[k]))
+        }),
+        grid("direct, 120 elements", "Newton iterations allowed", words(&NEWTON), &|size, s, k| {
+            mark(at(true, size, s, NEWTON[k], AT.1))
+        }),
+        grid("direct, 12 Newton iterations allowed", "elements", counts(), &|size, s, k| {
+            mark(at(true, size, s, 12, ELEMENTS[k]))
+        }),
     ];
     let mut table = Table::new(
         "falls",
         "All falls",
-        &["method", "length [m]", "elements", "substeps a frame", "iterations", "greatest elongation", "g h^2 over the length of an element"],
+        &[
+            "method",
+            "length [m]",
+            "elements",
+            "substeps a frame",
+            "iterations",
+            "greatest elongation",
+            "g h^2 over the length of an element",
+        ],
     )
     .hidden();
     for (c, f) in found {
@@ -110,7 +136,8 @@ fn finish(found: &[(Case, Fall)]) -> Outcome {
     let paper: Vec<(f64, &Fall)> = found.iter().filter(|(c, _)| !c.ours).map(|(c, f)| (way(c), f)).collect();
     let kept = paper.iter().filter(|(_, f)| f.worst <= BOUND).map(|p| p.0).fold(0.0, f64::max);
     let lost = paper.iter().filter(|(_, f)| f.diverged()).map(|p| p.0).fold(f64::INFINITY, f64::min);
-    let (n_kept, n_lost) = (paper.iter().filter(|(_, f)| f.worst <= BOUND).count(), paper.iter().filter(|(_, f)| f.diverged()).count());
+    let (n_kept, n_lost) =
+        (paper.iter().filter(|(_, f)| f.worst <= BOUND).count(), paper.iter().filter(|(_, f)| f.diverged()).count());
     out.say(format!(
         "The fall of figure 13 over size, substeps, iterations and number of elements: the greatest elongation in 5 s, green up to the published 3.2 %, yellow above, red where the thread becomes more than \
          twice as long or is lost. Of {} falls the published method keeps {n_kept} and loses {n_lost}. What decides is g h^2 / l, how far gravity moves a point in a step over the length of an element: every fall \

@@ -1,6 +1,7 @@
 //! A symmetric band matrix and its factorization L D L^T without pivoting.
 
-/// Subdiagonals that are kept: the joint at vertex i reaches from x of vertex i - 1 to z of vertex i + 1, 11 unknowns in a row.
+/// Subdiagonals that are kept: the joint at vertex i reaches from x of vertex i - 1 to z of vertex i + 1, 11 unknowns
+/// in a row.
 pub const HALF: usize = 10;
 const WIDTH: usize = HALF + 1;
 
@@ -45,7 +46,8 @@ impl Band {
             // Row of L times D, by forward substitution; divided by D afterwards.
             for c in first..r {
                 let other = &above[c * WIDTH..(c + 1) * WIDTH];
-                // Columns first..c of both rows: in row c they begin at first + HALF - c, which is not negative as c < r.
+                // Columns first..c of both rows: in row c they begin at first + HALF - c, which is not negative as c <
+                // r.
                 let (i, j, m) = (first + HALF - r, first + HALF - c, c - first);
                 let mut s = row[c + HALF - r];
                 for (x, y) in row[i..i + m].iter().zip(&other[j..j + m]) {
@@ -92,7 +94,8 @@ impl Band {
 mod tests {
     use super::*;
 
-    /// The matrix times the solution gives the right side back, with a fixed row among them; an indefinite matrix is refused.
+    /// The matrix times the solution gives the right side back, with a fixed row among them; an indefinite matrix is
+    /// refused.
     #[test]
     fn solves() {
         let n = 37;

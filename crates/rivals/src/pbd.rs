@@ -1,9 +1,10 @@
 //! Plain position-based dynamics: distances between neighbors, and between second neighbors against bending.
 //!
-//! Source: Müller and others 2007, as `points.rs` says. Bending is that of cloth and ropes before dihedral angles: a distance constraint from
-//! vertex to the vertex after next, of the length it has at rest, with a stiffness number of its own. One sweep of Gauss and Seidel goes along
-//! the rod, both constraints of an edge in turn. A stiffness number is the share of a violation that one projection removes, so that what it
-//! means depends on iterations, substeps and the number of edges; zero is none, one is rigid.
+//! Source: Müller and others 2007, as `points.rs` says. Bending is that of cloth and ropes before dihedral angles: a
+//! distance constraint from vertex to the vertex after next, of the length it has at rest, with a stiffness number of
+//! its own. One sweep of Gauss and Seidel goes along the rod, both constraints of an edge in turn. A stiffness number
+//! is the share of a violation that one projection removes, so that what it means depends on iterations, substeps and
+//! the number of edges; zero is none, one is rigid.
 //!
 //! Left out: twist and frames, which the method does not have. Young's modulus and shear modulus do nothing.
 

@@ -1,8 +1,8 @@
 //! Position-based elastic rods with ghost points.
 //!
-//! Source: Umetani, Schmidt, Stam, "Position-based elastic rods", SCA 2014, and its appendix. Beside each edge is a ghost point, which with the
-//! edge spans the material frame. The loop is that of Müller and others 2007 (`points.rs`). With an edge from p0 to p1, its ghost point g,
-//! its middle m and e = p1 - p0:
+//! Source: Umetani, Schmidt, Stam, "Position-based elastic rods", SCA 2014, and its appendix. Beside each edge is a
+//! ghost point, which with the edge spans the material frame. The loop is that of Müller and others 2007 (`points.rs`).
+//! With an edge from p0 to p1, its ghost point g, its middle m and e = p1 - p0:
 //!
 //! ```text
 //! |e| - L                     length of the edge                                                     [m]
@@ -14,25 +14,28 @@
 //! Omega_k = 2 (a_i . b_j - a_j . b_i) / (l (1 + sum a_i . b_i)),   (k, j, i) a turn of (1, 2, 3), a and b the frames of both edges
 //! ```
 //!
-//! which is 2 tan (angle / 2) / l along the axis of the rotation from a to b (appendix, section 2). The last is one constraint with three
-//! components: the correction is - W J^T (J W J^T)^-1 (s Omega - s Omega_rest) with stiffness numbers s in \[0, 1\] for bending about d1, d2 and
-//! for twist. The derivatives are our own: Omega by the rotations of both frames, these by the points. A sweep goes over the edges and
-//! joints from both ends in turn, the source's bilateral order, so that neither end comes first.
+//! which is 2 tan (angle / 2) / l along the axis of the rotation from a to b (appendix, section 2). The last is one
+//! constraint with three components: the correction is - W J^T (J W J^T)^-1 (s Omega - s Omega_rest) with stiffness
+//! numbers s in \[0, 1\] for bending about d1, d2 and for twist. The derivatives are our own: Omega by the rotations of
+//! both frames, these by the points. A sweep goes over the edges and joints from both ends in turn, the source's
+//! bilateral order, so that neither end comes first.
 //!
-//! Ours, where the source leaves a choice: the ghost point stands half an edge away and has the mass of its edge, so that the whole has twice
-//! the mass of the rod; loads on vertices (forces) act on the vertices' own mass. Gravity may act on ghost points or not: with it free fall is
-//! exact, but their weight beside the rod twists and tilts it (a thread hangs 2 mm beside its pin); without it a held rod rests nearly right (14
-//! micrometers), and one that falls freely turns about its axis.
+//! Ours, where the source leaves a choice: the ghost point stands half an edge away and has the mass of its edge, so
+//! that the whole has twice the mass of the rod; loads on vertices (forces) act on the vertices' own mass. Gravity may
+//! act on ghost points or not: with it free fall is exact, but their weight beside the rod twists and tilts it (a
+//! thread hangs 2 mm beside its pin); without it a held rod rests nearly right (14 micrometers), and one that falls
+//! freely turns about its axis.
 //!
-//! What the numbers mean: where constraints cannot all be met, as in a rod that is bent and twisted by its ends, the shape is (for small numbers,
-//! many sweeps) that of least sum of s Omega^T (J W J^T)^-1 Omega. For straight equal edges of length L and points of mass m, J W J^T is 6 / (m L^4)
-//! in bending and 10 / (m L^4) in twist, so that at equal numbers the rod is 0.6 times as stiff in twist as in bending. At the joint of a held
-//! edge it is 1 and 5 (six times and twice as stiff), at the next 5 and 9; there it also couples twist with bending, and a straight rod turned
-//! by 3 radians in 20 edges leaves its axis by a tenth of an edge. Large numbers leave less in the joints that a sweep comes to last. A ghost
-//! point beside the plane in which a rod is bent draws it out of the plane.
+//! What the numbers mean: where constraints cannot all be met, as in a rod that is bent and twisted by its ends, the
+//! shape is (for small numbers, many sweeps) that of least sum of s Omega^T (J W J^T)^-1 Omega. For straight equal
+//! edges of length L and points of mass m, J W J^T is 6 / (m L^4) in bending and 10 / (m L^4) in twist, so that at
+//! equal numbers the rod is 0.6 times as stiff in twist as in bending. At the joint of a held edge it is 1 and 5 (six
+//! times and twice as stiff), at the next 5 and 9; there it also couples twist with bending, and a straight rod turned
+//! by 3 radians in 20 edges leaves its axis by a tenth of an edge. Large numbers leave less in the joints that a sweep
+//! comes to last. A ghost point beside the plane in which a rod is bent draws it out of the plane.
 //!
-//! Left out: coupling with triangles and rigid bodies. Moduli do nothing: stiffness is in the numbers, which mean what iterations, substeps and
-//! the number of edges make of them.
+//! Left out: coupling with triangles and rigid bodies. Moduli do nothing: stiffness is in the numbers, which mean what
+//! iterations, substeps and the number of edges make of them.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -72,9 +75,17 @@ pub struct Pber {
 }
 
 impl Default for Settings {
-    /// Lengths and ghost points as stiff as they can be, bending and twisting half as much, twenty sweeps; for rods that are held.
+    /// Lengths and ghost points as stiff as they can be, bending and twisting half as much, twenty sweeps; for rods
+    /// that are held.
     fn default() -> Self {
-        Settings { substeps: 1, iterations: 20, stretching: 1.0, ghost: 1.0, bend_twist: DVec3::splat(0.5), ghost_gravity: false }
+        Settings {
+            substeps: 1,
+            iterations: 20,
+            stretching: 1.0,
+            ghost: 1.0,
+            bend_twist: DVec3::splat(0.5),
+            ghost_gravity: false,
+        }
     }
 }
 
@@ -101,8 +112,8 @@ impl Frame {
     }
     /// What a motion of p0, p1 and g turns the frame by, a vector along the world axes: three matrices.
     ///
-    /// With e and w = g - m moving by de and dw the frame turns by d3 x de / |e| and, about d3, by d2 . (dw - d3 (de . ..)) over the distance
-    /// across: d2 . (dw - (along / |e|) de) / across.
+    /// With e and w = g - m moving by de and dw the frame turns by d3 x de / |e| and, about d3, by d2 . (dw - d3 (de .
+    /// ..)) over the distance across: d2 . (dw - (along / |e|) de) / across.
     fn turns(&self) -> [DMat3; 3] {
         let (d2, d3) = (self.d.y_axis, self.d.z_axis);
         let swing = skew(d3) * (1.0 / self.length);
@@ -112,7 +123,8 @@ impl Frame {
     }
 }
 
-/// The Darboux vector between two frames \[1/m\], and its derivative by a rotation of `b` (a vector along the world axes; `a` gives the negative).
+/// The Darboux vector between two frames \[1/m\], and its derivative by a rotation of `b` (a vector along the world
+/// axes; `a` gives the negative).
 fn darboux(a: &Frame, b: &Frame, l: f64) -> (DVec3, DMat3) {
     let r = a.d.transpose() * b.d;
     let trace = r.x_axis.x + r.y_axis.y + r.z_axis.z;
@@ -141,12 +153,14 @@ impl Pber {
         let length = rod.rest_lengths();
         let ghost: Vec<f64> = length.iter().map(|l| 0.5 * l).collect();
         let with_ghosts = |shape: &Shape| -> Vec<DVec3> {
-            let ghosts = (0..length.len()).map(|i| (shape.points[i] + shape.points[i + 1]) * 0.5 + shape.frames[i] * DVec3::X * ghost[i]);
+            let ghosts = (0..length.len())
+                .map(|i| (shape.points[i] + shape.points[i + 1]) * 0.5 + shape.frames[i] * DVec3::X * ghost[i]);
             shape.points.iter().copied().chain(ghosts).collect()
         };
         let mut masses = rod.masses();
         let mut accelerations = scene.accelerations(&masses);
-        accelerations.resize(masses.len() + length.len(), if settings.ghost_gravity { scene.gravity } else { DVec3::ZERO });
+        accelerations
+            .resize(masses.len() + length.len(), if settings.ghost_gravity { scene.gravity } else { DVec3::ZERO });
         masses.extend(length.iter().map(|l| rod.density * rod.area() * l));
         let joint: Vec<f64> = length.windows(2).map(|l| 0.5 * (l[0] + l[1])).collect();
         let rest = with_ghosts(&rod.rest);
@@ -181,7 +195,14 @@ impl Pber {
             [Some(p), Some(q), Some(d1)] => Some((*p + *q) * 0.5 + *d1 * self.ghost[edge]),
             _ => None,
         };
-        let held = [(0, first[0]), (1, first[1]), (n + 1, ghost(&first, 0)), (n, last[0]), (n - 1, last[1]), (2 * n, ghost(&last, n - 1))];
+        let held = [
+            (0, first[0]),
+            (1, first[1]),
+            (n + 1, ghost(&first, 0)),
+            (n, last[0]),
+            (n - 1, last[1]),
+            (2 * n, ghost(&last, n - 1)),
+        ];
         for (i, at) in held {
             self.points.w[i] = if at.is_some() { 0.0 } else { self.points.w[i] };
         }
@@ -283,7 +304,8 @@ mod tests {
         libm::sin((k * k) as f64 * 1.3 + k as f64)
     }
 
-    /// The Darboux vector's derivatives by all five points against central differences, with ghost points that are not on their bisectors.
+    /// The Darboux vector's derivatives by all five points against central differences, with ghost points that are not
+    /// on their bisectors.
     #[test]
     fn darboux_derivatives() {
         let p: [DVec3; 5] = [0, 1, 2, 3, 4].map(|k: usize| {
@@ -311,14 +333,20 @@ mod tests {
         }
     }
 
-    /// J W J^T of straight equal edges of length one and points of mass one, inside, beside a held edge, and one further.
+    /// J W J^T of straight equal edges of length one and points of mass one, inside, beside a held edge, and one
+    /// further.
     #[test]
     fn stiffness_of_straight_joints() {
         let at = |x: f64| DVec3::X * x;
-        let (a, b) = (Frame::new(at(0.0), at(1.0), at(0.5) + DVec3::Y * 0.5), Frame::new(at(1.0), at(2.0), at(1.5) + DVec3::Y * 0.5));
+        let (a, b) = (
+            Frame::new(at(0.0), at(1.0), at(0.5) + DVec3::Y * 0.5),
+            Frame::new(at(1.0), at(2.0), at(1.5) + DVec3::Y * 0.5),
+        );
         let (ta, tb, by_turn) = (a.turns(), b.turns(), darboux(&a, &b, 1.0).1);
         let turns = [-ta[0], tb[0] - ta[1], tb[1], -ta[2], tb[2]];
-        for (w, bend, twist) in [([1.0; 5], 6.0, 10.0), ([0.0, 0.0, 1.0, 0.0, 1.0], 1.0, 5.0), ([0.0, 1.0, 1.0, 1.0, 1.0], 5.0, 9.0)] {
+        for (w, bend, twist) in
+            [([1.0; 5], 6.0, 10.0), ([0.0, 0.0, 1.0, 0.0, 1.0], 1.0, 5.0), ([0.0, 1.0, 1.0, 1.0, 1.0], 5.0, 9.0)]
+        {
             let system: DMat3 = (0..5).map(|k| by_turn * turns[k] * (by_turn * turns[k]).transpose() * w[k]).sum();
             let diagonal = DVec3::new(system.x_axis.x, system.y_axis.y, system.z_axis.z);
             assert!((diagonal - DVec3::new(bend, bend, twist)).length() < 1e-12, "{w:?}: {system}");

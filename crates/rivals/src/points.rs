@@ -1,7 +1,8 @@
-//! What the two position-based methods share: points with weights, prediction, corrections of a distance, and velocities.
+//! What the two position-based methods share: points with weights, prediction, corrections of a distance, and
+//! velocities.
 //!
-//! Source: Müller, Heidelberger, Hennix, Ratcliff, "Position based dynamics", J. Vis. Commun. Image R. 2007: the loop of section 3.1, the
-//! projection of equations (8) and (9), the distance constraint of equations (10) and (11).
+//! Source: Müller, Heidelberger, Hennix, Ratcliff, "Position based dynamics", J. Vis. Commun. Image R. 2007: the loop
+//! of section 3.1, the projection of equations (8) and (9), the distance constraint of equations (10) and (11).
 
 use glam::DVec3;
 
@@ -20,7 +21,13 @@ pub struct Points {
 impl Points {
     /// At rest.
     pub fn new(p: Vec<DVec3>, masses: &[f64], accelerations: Vec<DVec3>) -> Self {
-        Points { before: p.clone(), v: vec![DVec3::ZERO; p.len()], w: masses.iter().map(|m| 1.0 / m).collect(), accelerations, p }
+        Points {
+            before: p.clone(),
+            v: vec![DVec3::ZERO; p.len()],
+            w: masses.iter().map(|m| 1.0 / m).collect(),
+            accelerations,
+            p,
+        }
     }
     /// Velocities by gravity and loads, then positions by velocities, as explicit as the source has it.
     pub fn predict(&mut self, h: f64, drag: f64) {
@@ -62,7 +69,11 @@ pub fn lead(scene: &Scene, t: f64, first_length: f64, last_length: f64) -> [Led;
         Hold::Pin(at) => [Some(at(t)), None, None],
         Hold::Clamp(at) => {
             let pose = at(t);
-            [Some(pose.position), Some(pose.position + pose.orientation * DVec3::Z * length), Some(pose.orientation * DVec3::X)]
+            [
+                Some(pose.position),
+                Some(pose.position + pose.orientation * DVec3::Z * length),
+                Some(pose.orientation * DVec3::X),
+            ]
         }
     })
 }

@@ -1,9 +1,10 @@
 //! What is asked of every solver: one rod, how its ends are held, what pulls at it; and what can be read while it runs.
 //!
-//! A rod of n edges has n + 1 vertices. The frame of an edge is `world_from_material`: its columns are the directors d1, d2 (across) and d3,
-//! which is the direction of the edge. A clamp holds a whole edge: two vertices and the frame. Bending between the first two edges is counted
-//! at the vertex they share and stands for half an edge on either side, so that a clamped rod bends from the *middle* of the held edge on:
-//! against theory, a rod clamped at one end has the length of n - 1/2 edges, one clamped at both ends that of n - 1.
+//! A rod of n edges has n + 1 vertices. The frame of an edge is `world_from_material`: its columns are the directors
+//! d1, d2 (across) and d3, which is the direction of the edge. A clamp holds a whole edge: two vertices and the frame.
+//! Bending between the first two edges is counted at the vertex they share and stands for half an edge on either side,
+//! so that a clamped rod bends from the *middle* of the held edge on: against theory, a rod clamped at one end has the
+//! length of n - 1/2 edges, one clamped at both ends that of n - 1.
 
 use std::fmt;
 
@@ -24,7 +25,8 @@ pub enum Hold {
     Free,
     /// The end vertex is led, and turns freely.
     Pin(Box<dyn Fn(f64) -> DVec3 + Send + Sync>),
-    /// The end edge is led: the vertex at the end lies at the position, the other one along the orientation's third column.
+    /// The end edge is led: the vertex at the end lies at the position, the other one along the orientation's third
+    /// column.
     Clamp(Box<dyn Fn(f64) -> Pose + Send + Sync>),
 }
 
@@ -93,7 +95,11 @@ pub trait Solver {
     }
     /// The greatest change of length of an edge over its rest length, without its sign.
     fn greatest_strain(&self) -> f64 {
-        self.positions().windows(2).zip(self.rest_lengths()).map(|(p, l)| (p[0].distance(p[1]) / l - 1.0).abs()).fold(0.0, f64::max)
+        self.positions()
+            .windows(2)
+            .zip(self.rest_lengths())
+            .map(|(p, l)| (p[0].distance(p[1]) / l - 1.0).abs())
+            .fold(0.0, f64::max)
     }
 }
 
@@ -113,8 +119,8 @@ impl Pose {
 }
 
 impl Shape {
-    /// A centerline whose frames do not twist: each is the one before, carried over by the least rotation. The first d1 is the direction
-    /// across the first edge that is nearest to `d1`.
+    /// A centerline whose frames do not twist: each is the one before, carried over by the least rotation. The first d1
+    /// is the direction across the first edge that is nearest to `d1`.
     pub fn untwisted(points: Vec<DVec3>, d1: DVec3) -> Self {
         let mut frames: Vec<DQuat> = Vec::with_capacity(points.len().saturating_sub(1));
         let mut across = d1;
@@ -177,7 +183,9 @@ impl Scene {
             if shape.points.len() != n || shape.frames.len() != n - 1 {
                 return wrong(format!("{name} shape: {n} vertices and {} frames are wanted", n - 1));
             }
-            if !shape.points.iter().all(|p| p.is_finite()) || !shape.points.windows(2).all(|p| p[0].distance(p[1]) > 0.0) {
+            if !shape.points.iter().all(|p| p.is_finite())
+                || !shape.points.windows(2).all(|p| p[0].distance(p[1]) > 0.0)
+            {
                 return wrong(format!("{name} shape: neighbors must be finite and apart"));
             }
             for i in 0..n - 1 {
@@ -187,7 +195,9 @@ impl Scene {
                 }
             }
         }
-        for (name, value) in [("radius", rod.radius), ("young", rod.young), ("shear", rod.shear), ("density", rod.density)] {
+        for (name, value) in
+            [("radius", rod.radius), ("young", rod.young), ("shear", rod.shear), ("density", rod.density)]
+        {
             if !(value > 0.0 && value.is_finite()) {
                 return wrong(format!("{name} must be positive, it is {value}"));
             }

@@ -1,4 +1,5 @@
-//! Discrete elastic rods against closed forms. Lengths and bars are those of a rod clamped in the middle of its held edges (`scene.rs`).
+//! Discrete elastic rods against closed forms. Lengths and bars are those of a rod clamped in the middle of its held
+//! edges (`scene.rs`).
 
 mod support;
 
@@ -9,8 +10,8 @@ use support::{line, thread};
 use sutura_rivals::der::Settings;
 use sutura_rivals::{Der, Hold, Pose, Rod, Scene, Shape, Solver};
 
-/// A level thread along x, clamped at its first edge, whose length from the middle of that edge on is 50 mm. Ends at rest: reach and drop
-/// of its tip from there, over the length.
+/// A level thread along x, clamped at its first edge, whose length from the middle of that edge on is 50 mm. Ends at
+/// rest: reach and drop of its tip from there, over the length.
 fn cantilever(n: usize, load: f64, weight: f64) -> (f64, f64) {
     let length = 0.05;
     let edge = length / (n as f64 - 0.5);
@@ -25,7 +26,8 @@ fn cantilever(n: usize, load: f64, weight: f64) -> (f64, f64) {
         ..Scene::of(rod)
     };
     let mut der = Der::new(scene, Settings { iterations: 500, ..Settings::default() }).unwrap();
-    // Steps this long forget inertia. Each jumps to rest, which takes Newton's method more iterations than a step of a frame.
+    // Steps this long forget inertia. Each jumps to rest, which takes Newton's method more iterations than a step of a
+    // frame.
     for _ in 0..12 {
         der.step(10.0);
     }
@@ -63,8 +65,9 @@ fn elastica_under_its_weight() {
     }
 }
 
-/// A rod clamped at both ends, which do not come nearer, is turned until its torque is `m` EI / L. Beyond Greenhill's limit it leaves its axis,
-/// by so little that it only stretches to bear the tension at which `m` is the limit: that tension over EI / L^2, and the torque.
+/// A rod clamped at both ends, which do not come nearer, is turned until its torque is `m` EI / L. Beyond Greenhill's
+/// limit it leaves its axis, by so little that it only stretches to bear the tension at which `m` is the limit: that
+/// tension over EI / L^2, and the torque.
 fn greenhill(n: usize, m: f64) -> [f64; 2] {
     let length = 0.1;
     let edge = length / (n as f64 - 1.0);
@@ -90,7 +93,8 @@ fn greenhill(n: usize, m: f64) -> [f64; 2] {
     [(forces[0] + forces[1]).z * length * length / ei, der.twisting_moments()[0] * length / ei]
 }
 
-/// Clamped rods under tension t = T L^2 / EI lose their axis at the torque m = M L / EI (determinant of the linear problem; 8.986819 at t = 0).
+/// Clamped rods under tension t = T L^2 / EI lose their axis at the torque m = M L / EI (determinant of the linear
+/// problem; 8.986819 at t = 0).
 #[test]
 fn greenhill_clamped_rod() {
     let [t, _] = greenhill(40, 0.98 * 8.986819);
@@ -103,8 +107,9 @@ fn greenhill_clamped_rod() {
     }
 }
 
-/// A rod clamped at both ends, drawn together by 10 mm on 200 mm and turned twelve times, leaves its axis in a helix whose envelope is a
-/// hyperbolic secant. Tension 15.8416 mN and torque 0.210038 mN m are those of the closed form for a long rod.
+/// A rod clamped at both ends, drawn together by 10 mm on 200 mm and turned twelve times, leaves its axis in a helix
+/// whose envelope is a hyperbolic secant. Tension 15.8416 mN and torque 0.210038 mN m are those of the closed form for
+/// a long rod.
 #[test]
 fn localized_helical_buckling() {
     let mut errors = vec![];
@@ -139,12 +144,15 @@ fn localized_helical_buckling() {
     for (t, m) in &errors {
         assert!(t.abs() < 0.02 && m.abs() < 0.005, "{errors:?}");
     }
-    assert!(errors[1].0.abs() < 0.3 * errors[0].0.abs() && errors[1].1.abs() < 0.3 * errors[0].1.abs(), "not of second order: {errors:?}");
+    assert!(
+        errors[1].0.abs() < 0.3 * errors[0].0.abs() && errors[1].1.abs() < 0.3 * errors[0].1.abs(),
+        "not of second order: {errors:?}"
+    );
 }
 
-/// Michell: a naturally straight rod bent to a ring and turned loses its plane at 2 pi sqrt 3 EI / GJ; a ring of n edges stands 34 / n^2 more.
-/// The ring is an open rod whose two held edges lie on each other. Ends at rest: its torque over Michell's. (It
-/// may swing about the held edge as a whole, which costs nothing.)
+/// Michell: a naturally straight rod bent to a ring and turned loses its plane at 2 pi sqrt 3 EI / GJ; a ring of n
+/// edges stands 34 / n^2 more. The ring is an open rod whose two held edges lie on each other. Ends at rest: its torque
+/// over Michell's. (It may swing about the held edge as a whole, which costs nothing.)
 fn michell(n: usize, share: f64) -> f64 {
     // n - 1 edges close the ring; the last edge lies on the first.
     let round = n as f64 - 1.0;
@@ -185,14 +193,21 @@ fn michell_ring() {
     }
 }
 
-/// A helix that is its own rest shape has no forces: it stays to rounding, also when it is turned in space and its reference frames are not
-/// those of its rest shape.
+/// A helix that is its own rest shape has no forces: it stays to rounding, also when it is turned in space and its
+/// reference frames are not those of its rest shape.
 #[test]
 fn a_natural_helix_stays() {
     let helix = support::helix(60);
     let turn = DQuat::from_rotation_x(1.0) * DQuat::from_rotation_z(0.5);
-    let start = Shape { points: helix.points.iter().map(|&p| turn * p).collect(), frames: helix.frames.iter().map(|&q| turn * q).collect() };
-    let mut der = Der::new(Scene::of(Rod { start: start.clone(), rest: helix, ..thread(line(60, 1e-3, DVec3::X)) }), Settings::default()).unwrap();
+    let start = Shape {
+        points: helix.points.iter().map(|&p| turn * p).collect(),
+        frames: helix.frames.iter().map(|&q| turn * q).collect(),
+    };
+    let mut der = Der::new(
+        Scene::of(Rod { start: start.clone(), rest: helix, ..thread(line(60, 1e-3, DVec3::X)) }),
+        Settings::default(),
+    )
+    .unwrap();
     for _ in 0..60 {
         der.step(1.0 / 60.0);
     }
@@ -202,8 +217,11 @@ fn a_natural_helix_stays() {
     let line = Shape::straight(DVec3::ZERO, DVec3::X * der.rest_lengths().iter().sum::<f64>(), 60, DVec3::Y);
     let rest = support::helix(60);
     let far = rest.points[0].distance(rest.points[60]);
-    let mut der =
-        Der::new(Scene { drag: 5.0, ..Scene::of(Rod { start: line, rest, ..thread(support::line(60, 1e-3, DVec3::X)) }) }, Settings::default()).unwrap();
+    let mut der = Der::new(
+        Scene { drag: 5.0, ..Scene::of(Rod { start: line, rest, ..thread(support::line(60, 1e-3, DVec3::X)) }) },
+        Settings::default(),
+    )
+    .unwrap();
     for _ in 0..240 {
         der.step(1.0 / 60.0);
     }
@@ -212,10 +230,14 @@ fn a_natural_helix_stays() {
     assert!(der.elastic_energy().iter().sum::<f64>() < 1e-15);
 }
 
-/// A free rod that flies and springs out of a bent shape: its center falls as implicit Euler has it, its momentum is exact.
+/// A free rod that flies and springs out of a bent shape: its center falls as implicit Euler has it, its momentum is
+/// exact.
 #[test]
 fn free_fall_and_momentum() {
-    let rod = Rod { start: support::helix(30), ..thread(line(30, support::helix(30).points[0].distance(support::helix(30).points[1]), DVec3::X)) };
+    let rod = Rod {
+        start: support::helix(30),
+        ..thread(line(30, support::helix(30).points[0].distance(support::helix(30).points[1]), DVec3::X))
+    };
     let masses = rod.masses();
     let total: f64 = masses.iter().sum();
     let g = DVec3::new(0.0, 0.0, -9.81);
@@ -238,8 +260,8 @@ fn free_fall_and_momentum() {
     assert_eq!(der.unsolved(), 0);
 }
 
-/// The first mode of a cantilever, omega = 3.516 sqrt(EI / (rho A L^4)), in a small free swing: inertia and stiffness. Implicit Euler makes of it
-/// atan(omega h) / h, and an amplitude that shrinks by 1 / sqrt(1 + (omega h)^2) a step.
+/// The first mode of a cantilever, omega = 3.516 sqrt(EI / (rho A L^4)), in a small free swing: inertia and stiffness.
+/// Implicit Euler makes of it atan(omega h) / h, and an amplitude that shrinks by 1 / sqrt(1 + (omega h)^2) a step.
 #[test]
 fn frequency_of_a_cantilever() {
     let (n, length) = (30, 0.05);

@@ -3,8 +3,8 @@
 use sutura::glam::DVec3;
 use sutura::knot::{Ends, KnotType, recognize};
 
-/// The polyline through `n + 1` points at equal arcs along `points`. (Scenes cut lines into equal chords instead; the engine's tests have
-/// their own copy, see there.)
+/// The polyline through `n + 1` points at equal arcs along `points`. (Scenes cut lines into equal chords instead; the
+/// engine's tests have their own copy, see there.)
 pub fn evenly(points: &[DVec3], n: usize) -> Vec<DVec3> {
     let mut arc = vec![0.0];
     for w in points.windows(2) {
@@ -40,7 +40,8 @@ pub fn knot_free(points: &[DVec3]) -> KnotType {
 const SEED: u64 = 1;
 
 /// A loose open overhand knot of this length \[m\] in `n` equal elements. The polynomial trefoil (Shastri)
-/// `(t^3 - 3 t, t^4 - 4 t^2, t^5 / 5 - 2 t)` with its height times 0.55 takes 45 % of the thread, straight tails the rest.
+/// `(t^3 - 3 t, t^4 - 4 t^2, t^5 / 5 - 2 t)` with its height times 0.55 takes 45 % of the thread, straight tails the
+/// rest.
 pub fn overhand(total: f64, n: usize) -> Vec<DVec3> {
     const FINE: usize = 4000;
     const KNOT: f64 = 0.45;
@@ -67,7 +68,8 @@ pub struct Stack {
     pub diameter: f64,
     /// Radius of the post \[m\]; its axis is z through the origin.
     pub post: f64,
-    /// Half twists of each throw, the first one next to the post; odd, positive is right-handed. 3 is a single throw, 5 a double one.
+    /// Half twists of each throw, the first one next to the post; odd, positive is right-handed. 3 is a single throw, 5
+    /// a double one.
     pub throws: Vec<i32>,
     /// Length of each tail \[m\].
     pub tail: f64,
@@ -83,9 +85,10 @@ const THROW_SPACING: f64 = 10.0;
 const POST_GAP: (f64, f64) = (2.0, 0.1);
 
 impl Stack {
-    /// The centerline of the loosely tied thread in elements of about this length \[m\]: a tail, the throws from the last to the first,
-    /// round the post, the throws from the first to the last, a tail. The throws lie under the post (toward -y); the strands of each
-    /// wind about a line along x, and every strand goes from one side to the other. The tails lie along x.
+    /// The centerline of the loosely tied thread in elements of about this length \[m\]: a tail, the throws from the
+    /// last to the first, round the post, the throws from the first to the last, a tail. The throws lie under the post
+    /// (toward -y); the strands of each wind about a line along x, and every strand goes from one side to the other.
+    /// The tails lie along x.
     pub fn centerline(&self, element: f64) -> Vec<DVec3> {
         let (left, right) = (self.strand(-1.0), self.strand(1.0));
         let mut points: Vec<DVec3> = left.into_iter().rev().collect();
@@ -99,7 +102,11 @@ impl Stack {
     /// Over the top of the post, from left to right.
     fn arc(&self) -> Vec<DVec3> {
         const FINE: u32 = 200;
-        (0..=FINE).map(|i| self.on_post(LEAVES + (core::f64::consts::PI - 2.0 * LEAVES) * (1.0 - f64::from(i) / f64::from(FINE)))).collect()
+        (0..=FINE)
+            .map(|i| {
+                self.on_post(LEAVES + (core::f64::consts::PI - 2.0 * LEAVES) * (1.0 - f64::from(i) / f64::from(FINE)))
+            })
+            .collect()
     }
 
     /// The point of the loop at this angle from the x axis.
@@ -152,7 +159,8 @@ fn bend(from: DVec3, heading: DVec3, to: DVec3, arriving: DVec3) -> Vec<DVec3> {
     let reach = from.distance(to) * (1.5 - 0.5 * heading.dot(arriving));
     let point = |u: f64| {
         let (v, u2, v2) = (1.0 - u, u * u, (1.0 - u) * (1.0 - u));
-        from * (v2 * (1.0 + 2.0 * u)) + heading * (reach * u * v2) + to * (u2 * (1.0 + 2.0 * v)) - arriving * (reach * u2 * v)
+        from * (v2 * (1.0 + 2.0 * u)) + heading * (reach * u * v2) + to * (u2 * (1.0 + 2.0 * v))
+            - arriving * (reach * u2 * v)
     };
     (1..=FINE).map(|i| point(f64::from(i) / f64::from(FINE))).collect()
 }
@@ -213,13 +221,17 @@ mod tests {
             let points = stack.centerline(stack.diameter);
             assert_eq!(entries(&points, &rest_lengths(&points), 0.5 * stack.diameter), None, "{throws:?}");
             let pieces: Vec<DVec3> = points.windows(2).map(|w| (w[1] - w[0]) / stack.diameter).collect();
-            // No bend is sharper than one of radius one diameter, which a tight knot has too: a radian from element to element.
+            // No bend is sharper than one of radius one diameter, which a tight knot has too: a radian from element to
+            // element.
             let sharpest = pieces.windows(2).map(|w| w[0].angle_between(w[1])).fold(0.0, f64::max);
             assert!(sharpest < 1.0, "{throws:?}: {sharpest}");
             for (w, piece) in points.windows(2).zip(&pieces) {
                 // Chords cut corners, over a radian by 4 %; rest lengths are the chords', which may differ by a tenth.
                 assert!((0.9..1.02).contains(&piece.length()), "{throws:?}: {}", piece.length());
-                let nearest = [0.0, 0.25, 0.5, 0.75].map(|u| w[0].lerp(w[1], u).truncate().length()).into_iter().fold(f64::INFINITY, f64::min);
+                let nearest = [0.0, 0.25, 0.5, 0.75]
+                    .map(|u| w[0].lerp(w[1], u).truncate().length())
+                    .into_iter()
+                    .fold(f64::INFINITY, f64::min);
                 assert!(nearest > stack.post + 0.5 * stack.diameter, "{throws:?}: {nearest}");
             }
         }

@@ -1,5 +1,6 @@
-//! Firm loads, up to the strength of a suture with a knot: knots drawn tight, threads pressed onto each other, wound around a post, hooked, and drawn over
-//! edges of every radius. Nothing may pass through, nothing may be given up; where theory has a force, it is compared.
+//! Firm loads, up to the strength of a suture with a knot: knots drawn tight, threads pressed onto each other, wound
+//! around a post, hooked, and drawn over edges of every radius. Nothing may pass through, nothing may be given up;
+//! where theory has a force, it is compared.
 
 use clap::Args;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -8,8 +9,8 @@ use std::time::Duration;
 use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    ContactWith, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose, Rod, RodSpec, Settings, ShapeMotion,
-    ShapeSpec, Shear, World,
+    ContactWith, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose,
+    Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, Shear, World,
 };
 use sutura_scene::presets::{find_material, find_size, knot_pull};
 
@@ -49,14 +50,31 @@ struct Thread {
 
 impl Thread {
     fn preset(size: &str, material: &str) -> Result<Self, String> {
-        let (size, m) = (find_size(size).map_err(|e| e.to_string())?, find_material(material).map_err(|e| e.to_string())?);
+        let (size, m) =
+            (find_size(size).map_err(|e| e.to_string())?, find_material(material).map_err(|e| e.to_string())?);
         let made = Thread::new(0.5 * size.diameter.value, m.young_modulus.value, m.friction.value);
-        let material = Material { shear: Shear::Poisson(m.poisson_ratio.value), density: m.density.value, bend_scale: m.bend_scale.value, ..made.material };
+        let material = Material {
+            shear: Shear::Poisson(m.poisson_ratio.value),
+            density: m.density.value,
+            bend_scale: m.bend_scale.value,
+            ..made.material
+        };
         Ok(Thread { material, ..made })
     }
     fn new(radius: f64, young_modulus: f64, mu: f64) -> Self {
         let shear = Shear::Poisson(0.4);
-        Thread { radius, material: Material { young_modulus, shear, density: 1140.0, bend_scale: 1.0, bend_damping: 0.01, plasticity: None }, mu }
+        Thread {
+            radius,
+            material: Material {
+                young_modulus,
+                shear,
+                density: 1140.0,
+                bend_scale: 1.0,
+                bend_damping: 0.01,
+                plasticity: None,
+            },
+            mu,
+        }
     }
     /// E A \[N\].
     fn axial(&self) -> f64 {
@@ -71,10 +89,11 @@ impl Thread {
     fn crossed(&self, force: f64) -> f64 {
         libm::pow(3.0 * force / (2.0 * self.flank() * self.radius.sqrt()), 2.0 / 3.0) / (2.0 * self.radius)
     }
-    /// By Hertz, in diameters: how far it is pressed by a force onto a rigid rod of this radius that crosses it, without the correction for an
-    /// ellipse (at most 1).
+    /// By Hertz, in diameters: how far it is pressed by a force onto a rigid rod of this radius that crosses it,
+    /// without the correction for an ellipse (at most 1).
     fn onto(&self, radius: f64, force: f64) -> f64 {
-        libm::cbrt(9.0 * force * force / (16.0 * self.flank() * self.flank() * (self.radius * radius).sqrt())) / (2.0 * self.radius)
+        libm::cbrt(9.0 * force * force / (16.0 * self.flank() * self.flank() * (self.radius * radius).sqrt()))
+            / (2.0 * self.radius)
     }
 }
 
@@ -88,7 +107,8 @@ struct Row {
     least: [Option<f64>; 2],
     /// The same at the end.
     last: [Option<f64>; 2],
-    /// Largest contact force at the end, between threads and with shapes \[N\], and by Hertz how deep it presses, in diameters.
+    /// Largest contact force at the end, between threads and with shapes \[N\], and by Hertz how deep it presses, in
+    /// diameters.
     pressed: [f64; 2],
     hertz: [Option<f64>; 2],
     /// Forces measured and by theory, in words.
@@ -164,8 +184,13 @@ impl<'a> Run<'a> {
         trace: &'a mut dyn FnMut(String),
         build: impl FnOnce(&mut World) -> Result<T, sutura::Error>,
     ) -> Result<(Self, T), String> {
-        let settings =
-            Settings { gravity: DVec3::ZERO, linear_damping: 0.99, angular_damping: 0.9, friction: Friction::coulomb(thread.mu), ..Settings::default() };
+        let settings = Settings {
+            gravity: DVec3::ZERO,
+            linear_damping: 0.99,
+            angular_damping: 0.9,
+            friction: Friction::coulomb(thread.mu),
+            ..Settings::default()
+        };
         let mut world = World::new(settings).map_err(text)?;
         let built = build(&mut world).map_err(text)?;
         Ok((Run { s: Session::new(world, budget), trace, thread: thread.clone(), row: Row::default() }, built))
@@ -208,7 +233,10 @@ impl<'a> Run<'a> {
         let most = self.largest();
         self.row.last = [now.report().thread_clearance, now.report().shape_clearance];
         self.row.pressed = most;
-        self.row.hertz = [(most[0] > 0.0).then(|| self.thread.crossed(most[0])), radius.filter(|_| most[1] > 0.0).map(|r| self.thread.onto(r, most[1]))];
+        self.row.hertz = [
+            (most[0] > 0.0).then(|| self.thread.crossed(most[0])),
+            radius.filter(|_| most[1] > 0.0).map(|r| self.thread.onto(r, most[1])),
+        ];
     }
     /// The row, after a run that came to its end or not.
     fn row(mut self, ended: Result<(), String>) -> Row {
@@ -255,14 +283,21 @@ fn overhand(n: usize) -> Vec<DVec3> {
 }
 
 /// An overhand knot, drawn by a force at both ends, held, and where wanted let go.
-fn knot(thread: &Thread, force: f64, let_go: bool, budget: Budget, trace: &mut dyn FnMut(String)) -> Result<Row, String> {
+fn knot(
+    thread: &Thread,
+    force: f64,
+    let_go: bool,
+    budget: Budget,
+    trace: &mut dyn FnMut(String),
+) -> Result<Row, String> {
     let (mut run, (rod, grips)) = Run::new(thread, budget, trace, |world| {
         let rod = world.insert_rod(&RodSpec::new(overhand(150), thread.radius, thread.material.clone()))?;
         let start = world.insert_grip(&pin(rod, Place::Start, pull(DVec3::NEG_Y, force, 0.05)))?;
         let end = world.insert_grip(&pin(rod, Place::End, pull(DVec3::Y, force, 0.05)))?;
         Ok((rod, [start, end]))
     })?;
-    let shape = |run: &Run<'_>| run.s.world.rod(rod).map_or(String::new(), |r| knot_free(r.positions()).name().to_string());
+    let shape =
+        |run: &Run<'_>| run.s.world.rod(rod).map_or(String::new(), |r| knot_free(r.positions()).name().to_string());
     let before = shape(&run);
     let mut drawn = [0.0; 2];
     let mut go = |run: &mut Run<'_>| {
@@ -293,8 +328,15 @@ fn knot(thread: &Thread, force: f64, let_go: bool, budget: Budget, trace: &mut d
     Ok(run.row(ended))
 }
 
-/// Two threads crossed at right angles, between a table and a plate, or the upper one between jaws at its ends and the lower one held in jaws.
-fn crossed(thread: &Thread, force: f64, jaws: bool, budget: Budget, trace: &mut dyn FnMut(String)) -> Result<Row, String> {
+/// Two threads crossed at right angles, between a table and a plate, or the upper one between jaws at its ends and the
+/// lower one held in jaws.
+fn crossed(
+    thread: &Thread,
+    force: f64,
+    jaws: bool,
+    budget: Budget,
+    trace: &mut dyn FnMut(String),
+) -> Result<Row, String> {
     let r = thread.radius;
     // The places that cross are in the middle of one element and at a particle of the other.
     let (half, n) = (16.0 * r, 15);
@@ -311,15 +353,21 @@ fn crossed(thread: &Thread, force: f64, jaws: bool, budget: Budget, trace: &mut 
             }
         } else {
             world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::at(DVec3::Z * (-1.1 * r))))?;
-            let plate =
-                ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::new(1.5 * half, 1.5 * half, 1e-3) }, Pose::at(height + DVec3::Z * (1.1 * r + 1e-3)));
-            world.insert_shape(&ShapeSpec { motion: ShapeMotion::Pushed { direction: DVec3::NEG_Z, force, speed_limit: 0.01 }, ..plate })?;
+            let plate = ShapeSpec::fixed(
+                Geometry::Box { half_sides: DVec3::new(1.5 * half, 1.5 * half, 1e-3) },
+                Pose::at(height + DVec3::Z * (1.1 * r + 1e-3)),
+            );
+            world.insert_shape(&ShapeSpec {
+                motion: ShapeMotion::Pushed { direction: DVec3::NEG_Z, force, speed_limit: 0.01 },
+                ..plate
+            })?;
         }
         Ok(())
     })?;
     let ended = run.wait(1.0);
     run.rests(None);
-    let pressed: f64 = run.s.world.contacts().filter(|c| matches!(c.b, ContactWith::Thread(..))).map(|c| c.force.z.abs()).sum();
+    let pressed: f64 =
+        run.s.world.contacts().filter(|c| matches!(c.b, ContactWith::Thread(..))).map(|c| c.force.z.abs()).sum();
     // Several rows share it.
     run.row.hertz[0] = Some(run.thread.crossed(pressed));
     run.row.force = format!("{pressed:.3} of {force} N");
@@ -328,7 +376,14 @@ fn crossed(thread: &Thread, force: f64, jaws: bool, budget: Budget, trace: &mut 
 }
 
 /// Five turns around a post; one end is held, the other drawn by a force.
-fn wound(thread: &Thread, turns: f64, post: f64, force: f64, budget: Budget, trace: &mut dyn FnMut(String)) -> Result<Row, String> {
+fn wound(
+    thread: &Thread,
+    turns: f64,
+    post: f64,
+    force: f64,
+    budget: Budget,
+    trace: &mut dyn FnMut(String),
+) -> Result<Row, String> {
     let (r, tail) = (thread.radius, 0.03);
     let reach = post + 1.05 * r;
     let pitch = 3.0 * r;
@@ -345,15 +400,20 @@ fn wound(thread: &Thread, turns: f64, post: f64, force: f64, budget: Budget, tra
     let out = (fine[400] - fine[399]).normalize();
     let (mut run, [still, drawn]) = Run::new(thread, budget, trace, |world| {
         let rod = world.insert_rod(&RodSpec::new(evenly(&points, n), r, thread.material.clone()))?;
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: post, half_length: 0.02 }, Pose::IDENTITY))?;
-        Ok([world.insert_grip(&pin(rod, Place::Start, Drive::Pose))?, world.insert_grip(&pin(rod, Place::End, pull(out, force, 0.02)))?])
+        world
+            .insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: post, half_length: 0.02 }, Pose::IDENTITY))?;
+        Ok([
+            world.insert_grip(&pin(rod, Place::Start, Drive::Pose))?,
+            world.insert_grip(&pin(rod, Place::End, pull(out, force, 0.02)))?,
+        ])
     })?;
     let ended = run.wait(3.0);
     run.rests(Some(post));
     let (held, drew) = (run.grip(still).length(), run.grip(drawn).dot(out));
     let theory = force * (-thread.mu * TAU * turns).exp();
     run.row.force = format!("{drew:.3} of {force} N; {held:.4} N at the held end, no more than slips on: {theory:.4}");
-    // What turns hold by friction they may hold more of, where they do not slip; the bend of the thread pulls at the held end too.
+    // What turns hold by friction they may hold more of, where they do not slip; the bend of the thread pulls at the
+    // held end too.
     run.row.agrees = Some((drew / force - 1.0).abs() < 0.01);
     Ok(run.row(ended))
 }
@@ -396,14 +456,27 @@ const EDGE_MU: f64 = 0.2;
 /// Speed at which a thread is drawn over it \[m/s\].
 const EDGE_SPEED: f64 = 5e-3;
 
-/// A thread level from the grip to the edge, down from there, with a dead load at its end; drawn, and let out again. `radius` 0 is the edge of a box.
-fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, trace: &mut dyn FnMut(String)) -> Result<Row, String> {
+/// A thread level from the grip to the edge, down from there, with a dead load at its end; drawn, and let out again.
+/// `radius` 0 is the edge of a box.
+fn edge(
+    thread: &Thread,
+    radius: f64,
+    load: f64,
+    element: f64,
+    budget: Budget,
+    trace: &mut dyn FnMut(String),
+) -> Result<Row, String> {
     let (r, level, down) = (thread.radius, 0.03, 0.02);
-    // So far out that no chord of the bend overlaps to begin with. The thread then comes down to the edge from the grip, and turns by a little less.
+    // So far out that no chord of the bend overlaps to begin with. The thread then comes down to the edge from the
+    // grip, and turns by a little less.
     let reach = (radius + 1.1 * r).hypot(0.55 * element);
     let turn = FRAC_PI_2 - ((reach - radius - r) / level).atan();
     let mut points = vec![DVec3::new(-level, 0.0, reach)];
-    points.extend((0..=100).map(|i| libm::sincos(FRAC_PI_2 * f64::from(i) / 100.0)).map(|(s, c)| DVec3::new(reach * s, 0.0, reach * c)));
+    points.extend(
+        (0..=100)
+            .map(|i| libm::sincos(FRAC_PI_2 * f64::from(i) / 100.0))
+            .map(|(s, c)| DVec3::new(reach * s, 0.0, reach * c)),
+    );
     points.push(DVec3::new(reach, 0.0, -down));
     let n = (length(&points) / element).round() as usize;
     let dead = |force: f64| LoadKind::Point { place: Place::End, force: DVec3::NEG_Z * force, torque: DVec3::ZERO };
@@ -415,7 +488,10 @@ fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, t
         } else {
             // Its edge is at the origin; the thread goes along both faces.
             let half = 5e-3;
-            ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::new(half, 0.01, half) }, Pose::at(DVec3::new(-half, 0.0, -half)))
+            ShapeSpec::fixed(
+                Geometry::Box { half_sides: DVec3::new(half, 0.01, half) },
+                Pose::at(DVec3::new(-half, 0.0, -half)),
+            )
         };
         world.insert_shape(&shape)?;
         let grip = world.insert_grip(&pin(rod, Place::Start, Drive::Pose))?;
@@ -455,7 +531,8 @@ fn edge(thread: &Thread, radius: f64, load: f64, element: f64, budget: Budget, t
         Ok(())
     };
     let ended = go(&mut run, &mut ratios);
-    let words = |[mean, least, most]: [f64; 3], theory: f64| format!("{mean:.3} ({least:.2} to {most:.2}) for {theory:.3}");
+    let words =
+        |[mean, least, most]: [f64; 3], theory: f64| format!("{mean:.3} ({least:.2} to {most:.2}) for {theory:.3}");
     run.row.force = format!("drawn {}, let out {}", words(ratios[0], high), words(ratios[1], low));
     run.row.agrees = Some((ratios[0][0] / high - 1.0).abs() < EDGE_BAR && (ratios[1][0] / low - 1.0).abs() < EDGE_BAR);
     Ok(run.row(ended))
@@ -472,7 +549,10 @@ fn cases() -> Result<Vec<Case>, String> {
     let overhand_thread = Thread::new(0.25e-3, 2e9, 0.1);
     for force in [6.0, 10.0, 15.0] {
         let t = overhand_thread.clone();
-        all.push((format!("overhand, 0.5 mm, 2 GPa, {force} N"), Box::new(move |b, trace| knot(&t, force, false, b, trace))));
+        all.push((
+            format!("overhand, 0.5 mm, 2 GPa, {force} N"),
+            Box::new(move |b, trace| knot(&t, force, false, b, trace)),
+        ));
     }
     for (size, material) in [("2-0", "nylon"), ("3-0", "silk"), ("2-0", "steel")] {
         let t = Thread::preset(size, material)?;
@@ -480,22 +560,34 @@ fn cases() -> Result<Vec<Case>, String> {
         let of = find_material(if material == "steel" { "nylon" } else { material }).map_err(|e| e.to_string())?;
         let strength = knot_pull(find_size(size).map_err(|e| e.to_string())?, Some(of)).map_or(0.0, |f| f.value);
         let force = 0.9 * strength;
-        all.push((format!("overhand, {material} {size}, {force:.2} N, let go"), Box::new(move |b, trace| knot(&t, force, true, b, trace))));
+        all.push((
+            format!("overhand, {material} {size}, {force:.2} N, let go"),
+            Box::new(move |b, trace| knot(&t, force, true, b, trace)),
+        ));
     }
     let nylon = Thread::preset("2-0", "nylon")?;
     for jaws in [false, true] {
         for force in [1.0, 2.0, 5.0, 10.0, 20.0] {
             let t = nylon.clone();
             let how = if jaws { "jaws" } else { "plate" };
-            all.push((format!("crossed, nylon 2-0, {how}, {force} N"), Box::new(move |b, trace| crossed(&t, force, jaws, b, trace))));
+            all.push((
+                format!("crossed, nylon 2-0, {how}, {force} N"),
+                Box::new(move |b, trace| crossed(&t, force, jaws, b, trace)),
+            ));
         }
     }
     for (name, t) in [("nylon 2-0", nylon), ("silk 3-0", Thread::preset("3-0", "silk")?)] {
-        all.push((format!("wound 5 times, {name}, 5 N"), Box::new(move |b, trace| wound(&t, 5.0, 3e-3, 5.0, b, trace))));
+        all.push((
+            format!("wound 5 times, {name}, 5 N"),
+            Box::new(move |b, trace| wound(&t, 5.0, 3e-3, 5.0, b, trace)),
+        ));
     }
     for force in [4.0, 10.0] {
         let t = Thread::new(0.15e-3, 1e9, 0.2);
-        all.push((format!("hooked bights, 0.3 mm, 1 GPa, {force} N"), Box::new(move |b, trace| hooked(&t, force, b, trace))));
+        all.push((
+            format!("hooked bights, 0.3 mm, 1 GPa, {force} N"),
+            Box::new(move |b, trace| hooked(&t, force, b, trace)),
+        ));
     }
     let silk = Thread { mu: EDGE_MU, ..Thread::preset("3-0", "silk")? };
     for radius in [0.0, 0.05, 0.2, 0.5, 1.0, 2.0] {
@@ -563,8 +655,8 @@ mod tests {
 
     #[test]
     fn depths_are_those_of_hertz() {
-        // Nylon 2-0 of 0.32 mm and 2.2 GPa, crossed, at 5 N, and on a post of 5 mm, worked out by hand; the correction for the ellipse would take the
-        // second to 0.036.
+        // Nylon 2-0 of 0.32 mm and 2.2 GPa, crossed, at 5 N, and on a post of 5 mm, worked out by hand; the correction
+        // for the ellipse would take the second to 0.036.
         let nylon = Thread::preset("2-0", "nylon").unwrap();
         assert!((nylon.crossed(5.0) - 0.116).abs() < 1e-3, "{}", nylon.crossed(5.0));
         assert!((nylon.onto(5e-3, 5.0) - 0.0412).abs() < 1e-4, "{}", nylon.onto(5e-3, 5.0));

@@ -1,11 +1,15 @@
-//! Two hands at play: noisy, sudden, taking hold and letting go anywhere on a thread that hangs over a post above a table. They are hands: no stronger
-//! and no faster than the viewer's, so whatever they do there is a way to go on. No thread may pass through anything and no incident may arise.
+//! Two hands at play: noisy, sudden, taking hold and letting go anywhere on a thread that hangs over a post above a
+//! table. They are hands: no stronger and no faster than the viewer's, so whatever they do there is a way to go on. No
+//! thread may pass through anything and no incident may arise.
 
 use clap::Args;
 use std::collections::BTreeMap;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeSpec, Shear, World};
+use sutura::{
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeSpec,
+    Shear, World,
+};
 use sutura_generated::Draw;
 use sutura_scene::presets::{find_material, find_size};
 
@@ -105,8 +109,14 @@ impl Pair {
     fn new(number: u64, budget: Budget) -> Result<Self, String> {
         let text = |e: sutura::Error| e.to_string();
         let (size, material) = thread(number);
-        let (size, m) = (find_size(size).map_err(|e| e.to_string())?, find_material(material).map_err(|e| e.to_string())?);
-        let settings = Settings { linear_damping: 0.5, angular_damping: 0.5, friction: Friction::coulomb(m.friction.value), ..Settings::default() };
+        let (size, m) =
+            (find_size(size).map_err(|e| e.to_string())?, find_material(material).map_err(|e| e.to_string())?);
+        let settings = Settings {
+            linear_damping: 0.5,
+            angular_damping: 0.5,
+            friction: Friction::coulomb(m.friction.value),
+            ..Settings::default()
+        };
         let mut world = World::new(settings).map_err(text)?;
         let radius = 0.5 * size.diameter.value;
         let (n, reach) = ((LENGTH / ELEMENT) as usize, POST + 1.5 * radius);
@@ -131,7 +141,12 @@ impl Pair {
         };
         let rod = world.insert_rod(&RodSpec::new(points, radius, material)).map_err(text)?;
         let lying = DQuat::from_rotation_x(core::f64::consts::FRAC_PI_2);
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: 0.03 }, Pose::new(lift, lying))).map_err(text)?;
+        world
+            .insert_shape(&ShapeSpec::fixed(
+                Geometry::Cylinder { radius: POST, half_length: 0.03 },
+                Pose::new(lift, lying),
+            ))
+            .map_err(text)?;
         world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::at(DVec3::Z * TABLE))).map_err(text)?;
         let mut draw = Draw::seed(SEED, number);
         let hands = [0, 1].map(|_| Hand {
@@ -171,7 +186,9 @@ impl Pair {
                     if other.is_none_or(|(_, taken)| particle.abs_diff(taken) > 5) {
                         hand.at = x[particle as usize];
                         let hold = if d.chance(0.5) { Hold::Pin } else { Hold::Clamp };
-                        let grip = world.insert_grip(&GripSpec::new(self.rod, Place::Particle(particle), hold)).map_err(text)?;
+                        let grip = world
+                            .insert_grip(&GripSpec::new(self.rod, Place::Particle(particle), hold))
+                            .map_err(text)?;
                         hand.held = Some((grip, particle));
                         (hand.goal, hand.speed) = (goal(d), d.log(SPEEDS.0, SPEEDS.1));
                         hand.until = now + d.even(HOLDS.0, HOLDS.1);
@@ -189,8 +206,13 @@ impl Pair {
             }
             hand.at += way.clamp_length_max(hand.speed * FRAME);
             let beat = core::f64::consts::TAU * TREMOR.1 * now;
-            let tremor = DVec3::new(libm::sin(beat + hand.phase.x), libm::sin(1.1 * beat + hand.phase.y), libm::sin(0.9 * beat + hand.phase.z)) * TREMOR.0;
-            let (is, acting) = (world.grip_pose(grip).map_err(text)?.position, world.grip_wrench(grip).map_err(text)?.force);
+            let tremor = DVec3::new(
+                libm::sin(beat + hand.phase.x),
+                libm::sin(1.1 * beat + hand.phase.y),
+                libm::sin(0.9 * beat + hand.phase.z),
+            ) * TREMOR.0;
+            let (is, acting) =
+                (world.grip_pose(grip).map_err(text)?.position, world.grip_wrench(grip).map_err(text)?.force);
             let toward = (hand.at + tremor - is).clamp_length_max(FASTEST * FRAME);
             let drive = if acting.length() > OVER * FORCE {
                 hand.strained += 1;
@@ -260,7 +282,12 @@ impl Played {
             self.over(33.0).to_string(),
             format!("{:.0}", self.ms.iter().copied().fold(0.0, f64::max)),
             format!("{:.2}", self.slowest_second()),
-            [&self.ended, &self.first_passage, &self.first_incident].into_iter().filter(|t| !t.is_empty()).cloned().collect::<Vec<_>>().join("; "),
+            [&self.ended, &self.first_passage, &self.first_incident]
+                .into_iter()
+                .filter(|t| !t.is_empty())
+                .cloned()
+                .collect::<Vec<_>>()
+                .join("; "),
         ]
     }
 }
@@ -300,7 +327,8 @@ fn play(number: u64, time: f64, budget: f64, work: Option<f64>, trace: &mut dyn 
         }
         if frame % 6 == 5 {
             let s = &pair.s;
-            let held: Vec<String> = pair.hands.iter().map(|h| h.held.map_or("empty".into(), |(_, p)| format!("at {p}"))).collect();
+            let held: Vec<String> =
+                pair.hands.iter().map(|h| h.held.map_or("empty".into(), |(_, p)| format!("at {p}"))).collect();
             trace(format!(
                 "{:.2} s: hands {}, {} contacts, {:.1} ms, {} rejected so far, {} incidents, {} passages",
                 s.world.time(),
@@ -320,7 +348,11 @@ fn play(number: u64, time: f64, budget: f64, work: Option<f64>, trace: &mut dyn 
         kinds: s.kinds.clone(),
         first_incident: s.first_incident.clone(),
         passages: report.crossings.len(),
-        first_passage: report.crossings.first().map(|c| format!("passage at {:.4} s: {:?}", c.time, c.what)).unwrap_or_default(),
+        first_passage: report
+            .crossings
+            .first()
+            .map(|c| format!("passage at {:.4} s: {:?}", c.time, c.what))
+            .unwrap_or_default(),
         strained: hands.iter().map(|h| h.strained).sum(),
         strain: s.strain(),
         clearance: [report.thread_clearance, report.shape_clearance],

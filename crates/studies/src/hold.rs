@@ -1,5 +1,5 @@
-//! Which knots hold: a knot tied loosely around a post in two halves is drawn to a force by its tails and let go; then the halves of the
-//! post load its loop.
+//! Which knots hold: a knot tied loosely around a post in two halves is drawn to a force by its tails and let go; then
+//! the halves of the post load its loop.
 
 use crate::case::{Budget, assignments};
 use crate::curve::Stack;
@@ -17,10 +17,15 @@ use sutura_scene::presets;
 pub struct Hold;
 
 /// A thread of the study: name, material preset, whether bends and twist become permanent.
-const THREADS: [(&str, &str, bool); 4] =
-    [("silk", "silk", false), ("silk-set", "silk", true), ("monofilament", "polypropylene", false), ("monofilament-set", "polypropylene", true)];
+const THREADS: [(&str, &str, bool); 4] = [
+    ("silk", "silk", false),
+    ("silk-set", "silk", true),
+    ("monofilament", "polypropylene", false),
+    ("monofilament-set", "polypropylene", true),
+];
 /// A knot of the study: name and half twists of its throws.
-const KNOTS: [(&str, &[i32]); 4] = [("square", &[3, -3]), ("granny", &[3, 3]), ("surgeon", &[5, -3]), ("square+throw", &[3, -3, 3])];
+const KNOTS: [(&str, &[i32]); 4] =
+    [("square", &[3, -3]), ("granny", &[3, 3]), ("surgeon", &[5, -3]), ("square+throw", &[3, -3, 3])];
 /// Coefficients of friction of thread on thread.
 const MU: [f64; 8] = [0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5];
 /// Forces on the tails \[N\].
@@ -28,7 +33,8 @@ const DRAW: [f64; 3] = [0.5, 1.0, 2.0];
 
 /// 3-0, as the scene square_knot.
 const SIZE: &str = "3-0";
-/// Plastic set and damping as the scene square_knot; unverified. The same set for both materials: a strain of 5.6 % at the surface.
+/// Plastic set and damping as the scene square_knot; unverified. The same set for both materials: a strain of 5.6 % at
+/// the surface.
 const SET: Plasticity = Plasticity { yield_curvature: 500.0, yield_twist: 500.0, hardening: 0.02 };
 const BEND_DAMPING: f64 = 0.01;
 /// Radius of the halves of the post, and length of a tail before the draw \[m\].
@@ -46,8 +52,8 @@ const HOLD: f64 = 3.0;
 const HOLDS: f64 = 1e-4;
 /// Load from which on the loop counts as taut \[N\].
 const TAUT: f64 = 0.05;
-/// Growth of the taut loop beyond which a knot has failed \[m\]. A knot drawn in one go still tightens under the first load, by up to
-/// 1.8 mm in the cases seen; it holds less than 6 mm of thread.
+/// Growth of the taut loop beyond which a knot has failed \[m\]. A knot drawn in one go still tightens under the first
+/// load, by up to 1.8 mm in the cases seen; it holds less than 6 mm of thread.
 const FAILED: f64 = 5e-3;
 /// Growth of a loop that never was taut at which it has failed too: more than it was slack.
 const FAILED_SLACK: f64 = 8e-3;
@@ -71,7 +77,8 @@ impl Default for Case {
 }
 
 impl Case {
-    /// A case from `key=value` pairs; `l` is the element length in diameters, `substep` the number of substeps a second.
+    /// A case from `key=value` pairs; `l` is the element length in diameters, `substep` the number of substeps a
+    /// second.
     pub fn parse(text: &str) -> anyhow::Result<Case> {
         let mut case = Case::default();
         for (key, value) in assignments(text)? {
@@ -117,7 +124,8 @@ struct Found {
     /// Force on the loop after the tails were let go, and the largest after that \[N\].
     residual: f64,
     peak: f64,
-    /// Growth of the loop since it was taut, the end of the hold against its beginning, and the slip of the entries in the hold \[m\].
+    /// Growth of the loop since it was taut, the end of the hold against its beginning, and the slip of the entries in
+    /// the hold \[m\].
     growth: f64,
     growth_hold: Option<f64>,
     slip_hold: Option<f64>,
@@ -169,7 +177,10 @@ impl Bench<'_> {
         // The loop presses the halves together already; from that force to the load.
         self.found.residual = self.tied.load();
         let from = self.found.residual.clamp(0.0, LOAD);
-        for (what, duration, force) in [("loading", RAMP, &(|part| from + (LOAD - from) * part) as &dyn Fn(f64) -> f64), ("settling", SETTLE, &|_| LOAD)] {
+        for (what, duration, force) in [
+            ("loading", RAMP, &(|part| from + (LOAD - from) * part) as &dyn Fn(f64) -> f64),
+            ("settling", SETTLE, &|_| LOAD),
+        ] {
             if let Some(failed) = self.loaded(what, duration, force)? {
                 return Ok(failed);
             }
@@ -180,7 +191,11 @@ impl Bench<'_> {
         }
         let slip = marked.and_then(|marked| Some(self.tied.entries()?.slip_since(&marked)));
         (self.found.slip_hold, self.found.growth_hold) = (slip, Some(self.tied.opened() - opened));
-        Ok(if slip.is_some_and(|slip| slip < HOLDS) { "holds".into() } else { format!("slips at {:.2} N", self.found.peak) })
+        Ok(if slip.is_some_and(|slip| slip < HOLDS) {
+            "holds".into()
+        } else {
+            format!("slips at {:.2} N", self.found.peak)
+        })
     }
 }
 
@@ -294,17 +309,29 @@ impl Study for Hold {
         let mut out = String::from("# Which knots hold\n\n![Hold or slip](hold.png)\n");
         for grid in grids(table) {
             out.push_str(&format!("\n## {}\n\n", grid.title));
-            let head: Vec<String> = std::iter::once(format!("draw [{}] \\ mu", "N")).chain(MU.map(|m| m.to_string())).collect();
+            let head: Vec<String> =
+                std::iter::once(format!("draw [{}] \\ mu", "N")).chain(MU.map(|m| m.to_string())).collect();
             let head: Vec<&str> = head.iter().map(String::as_str).collect();
-            let rows = DRAW.iter().zip(&grid.cells).map(|(draw, cells)| std::iter::once(draw.to_string()).chain(cells.iter().map(map::Cell::words)).collect());
+            let rows = DRAW.iter().zip(&grid.cells).map(|(draw, cells)| {
+                std::iter::once(draw.to_string()).chain(cells.iter().map(map::Cell::words)).collect()
+            });
             out.push_str(&markdown(&head, rows));
         }
         let mm = |row: &[String], name: &str| table.number(row, name).map(|v| 1e-3 * v.abs());
-        let apart = |r: &&Vec<String>| mm(r, "slip_hold_mm").zip(mm(r, "growth_hold_mm")).is_some_and(|(slip, growth)| (slip < HOLDS) != (growth < HOLDS));
+        let apart = |r: &&Vec<String>| {
+            mm(r, "slip_hold_mm")
+                .zip(mm(r, "growth_hold_mm"))
+                .is_some_and(|(slip, growth)| (slip < HOLDS) != (growth < HOLDS))
+        };
         let n_apart = table.rows.iter().filter(apart).count();
         out.push_str(&format!("\nIn {n_apart} cases the slip of the entries in the hold and the growth of the loop are not on the same side of 0.1 mm.\n"));
         out.push_str("\n## Every case\n\n");
-        let all: Vec<&str> = Self::FACTORS.iter().chain(Self::MEASURES).copied().filter(|c| !["first_incident", "state_hash"].contains(c)).collect();
+        let all: Vec<&str> = Self::FACTORS
+            .iter()
+            .chain(Self::MEASURES)
+            .copied()
+            .filter(|c| !["first_incident", "state_hash"].contains(c))
+            .collect();
         out.push_str(&table.markdown(&all));
         Ok(out)
     }
@@ -326,7 +353,9 @@ fn grids(table: &Table) -> Vec<map::Grid> {
     let mut all = Vec::new();
     for (thread, (thread_name, ..)) in THREADS.iter().enumerate() {
         for (knot, (knot_name, _)) in KNOTS.iter().enumerate() {
-            let cells = DRAW.map(|draw| MU.map(|mu| cell(&Case { thread, knot, mu, draw, ..Case::default() })).to_vec()).to_vec();
+            let cells = DRAW
+                .map(|draw| MU.map(|mu| cell(&Case { thread, knot, mu, draw, ..Case::default() })).to_vec())
+                .to_vec();
             let title = format!("{thread_name}, {knot_name}");
             all.push(map::Grid {
                 title,
@@ -350,7 +379,9 @@ mod tests {
         all.sort();
         all.dedup();
         assert_eq!(all.len(), Hold::cases().len());
-        for (knot, want) in ["square", "granny-right", "surgeon-square-right", "square-and-throw-right"].into_iter().enumerate() {
+        for (knot, want) in
+            ["square", "granny-right", "surgeon-square-right", "square-and-throw-right"].into_iter().enumerate()
+        {
             let spec = Case { knot, ..Case::default() }.spec().unwrap();
             let tied = Tied::new(&spec, Budget { cpu_s: 1e3, frames: 1 }, &mut |_| {}).map(|t| t.knot());
             assert_eq!(tied, Ok(Ok(want.to_string())));

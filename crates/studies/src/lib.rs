@@ -1,5 +1,6 @@
-//! Parameter studies: many small cases of knots, stepped without scenes, whose tables the documentation shows. Each study can be stopped
-//! and taken up again. Nothing that is measured depends on a clock but the times themselves, and what a budget of CPU time cuts off.
+//! Parameter studies: many small cases of knots, stepped without scenes, whose tables the documentation shows. Each
+//! study can be stopped and taken up again. Nothing that is measured depends on a clock but the times themselves, and
+//! what a budget of CPU time cuts off.
 
 pub mod case;
 pub mod curve;

@@ -26,7 +26,8 @@ enum Which {
     Overhand {
         #[command(flatten)]
         common: Common,
-        /// Run one case, of the sweep or not, say how it goes and write nothing: `r=0.2,e=2,speed=0.05,mu=0.3,l=2,substep=240`
+        /// Run one case, of the sweep or not, say how it goes and write nothing:
+        /// `r=0.2,e=2,speed=0.05,mu=0.3,l=2,substep=240`
         #[arg(long = "try", value_name = "KEY=VALUE,...", conflicts_with_all = ["only", "again", "jobs"])]
         one: Option<String>,
     },
@@ -34,11 +35,13 @@ enum Which {
     Hold {
         #[command(flatten)]
         common: Common,
-        /// Run one case, of the study or not, say how it goes and write nothing: `thread=silk,knot=granny,draw=1,mu=0.3,l=1,substep=480`
+        /// Run one case, of the study or not, say how it goes and write nothing:
+        /// `thread=silk,knot=granny,draw=1,mu=0.3,l=1,substep=480`
         #[arg(long = "try", value_name = "KEY=VALUE,...", conflicts_with_all = ["only", "again", "jobs"])]
         one: Option<String>,
     },
-    /// Scenes of a generator, half of them absurd: no panic, no hang, no number that is not finite, the same bits however they are played
+    /// Scenes of a generator, half of them absurd: no panic, no hang, no number that is not finite, the same bits
+    /// however they are played
     Robustness(Robustness),
     /// Threads thrown at, over, through and into shapes of all kinds: nothing passes, nothing is given up
     Throws(Throws),

@@ -1,5 +1,5 @@
-//! Maps of hold or slip as a picture: one small grid for each thread and knot. SVG, and the same as PNG; text is set in `DejaVu Sans`,
-//! which is part of the program.
+//! Maps of hold or slip as a picture: one small grid for each thread and knot. SVG, and the same as PNG; text is set in
+//! `DejaVu Sans`, which is part of the program.
 
 use anyhow::Context as _;
 use plotters::prelude::*;
@@ -97,8 +97,12 @@ pub fn draw(grids: &[Grid], stem: &Path) -> anyhow::Result<()> {
         for (k, grid) in grids.iter().enumerate() {
             panel_of(&area, grid, (LEFT + panel.0 * (k % ACROSS) as i32, TOP + panel.1 * (k / ACROSS) as i32))?;
         }
-        let kinds =
-            [(Cell::Holds, "holds"), (Cell::Slips(0.0), "slips, after this load [N]"), (Cell::Opens(0.0), "opens"), (Cell::NotFinished, "not finished")];
+        let kinds = [
+            (Cell::Holds, "holds"),
+            (Cell::Slips(0.0), "slips, after this load [N]"),
+            (Cell::Opens(0.0), "opens"),
+            (Cell::NotFinished, "not finished"),
+        ];
         for (k, (cell, name)) in kinds.into_iter().enumerate() {
             let (x, y) = (LEFT + 220 * k as i32, size.1 - LEGEND / 2);
             area.draw(&Rectangle::new([(x, y - 7), (x + 18, y + 7)], cell.color().filled()))?;
@@ -115,7 +119,11 @@ fn font(size: u32, h: HPos) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK).pos(Pos::new(h, VPos::Center))
 }
 
-fn panel_of(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, grid: &Grid, (left, top): (i32, i32)) -> anyhow::Result<()> {
+fn panel_of(
+    area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    grid: &Grid,
+    (left, top): (i32, i32),
+) -> anyhow::Result<()> {
     let (columns, rows) = (grid.x.1.len() as i32, grid.y.1.len() as i32);
     area.draw(&Text::new(grid.title.clone(), (left + columns * CELL.0 / 2, top - 12), font(13, HPos::Center)))?;
     for (row, cells) in grid.cells.iter().enumerate() {
@@ -127,10 +135,18 @@ fn panel_of(area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>, grid: &G
     }
     let bottom = top + rows * CELL.1;
     for (column, level) in grid.x.1.iter().enumerate() {
-        area.draw(&Text::new(level.clone(), (left + column as i32 * CELL.0 + CELL.0 / 2, bottom + 9), font(10, HPos::Center)))?;
+        area.draw(&Text::new(
+            level.clone(),
+            (left + column as i32 * CELL.0 + CELL.0 / 2, bottom + 9),
+            font(10, HPos::Center),
+        ))?;
     }
     for (row, level) in grid.y.1.iter().enumerate() {
-        area.draw(&Text::new(level.clone(), (left - 5, top + (rows - 1 - row as i32) * CELL.1 + CELL.1 / 2), font(10, HPos::Right)))?;
+        area.draw(&Text::new(
+            level.clone(),
+            (left - 5, top + (rows - 1 - row as i32) * CELL.1 + CELL.1 / 2),
+            font(10, HPos::Right),
+        ))?;
     }
     area.draw(&Text::new(grid.x.0.clone(), (left + columns * CELL.0 / 2, bottom + 23), font(11, HPos::Center)))?;
     let turned = font(11, HPos::Center).transform(FontTransform::Rotate270);
@@ -177,7 +193,8 @@ mod tests {
             assert!(svg.contains(word), "{word}");
         }
         // The middle of the first cell of the PNG has the color of slip but for the text: look left of it.
-        let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.path().join("m.png")).unwrap()));
+        let decoder =
+            png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.path().join("m.png")).unwrap()));
         let mut reader = decoder.read_info().unwrap();
         let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
         let info = reader.next_frame(&mut pixels).unwrap();

@@ -39,7 +39,17 @@ pub struct Case {
 
 impl Default for Case {
     fn default() -> Self {
-        Case { radius: 0.25e-3, young_modulus: 2e9, speed: 0.05, mu: 0.3, element: 2.0, substep: 1.0 / 240.0, bend_damping: 0.01, released: 0.2, full: 0.01 }
+        Case {
+            radius: 0.25e-3,
+            young_modulus: 2e9,
+            speed: 0.05,
+            mu: 0.3,
+            element: 2.0,
+            substep: 1.0 / 240.0,
+            bend_damping: 0.01,
+            released: 0.2,
+            full: 0.01,
+        }
     }
 }
 
@@ -51,8 +61,8 @@ const LEFT: f64 = 50.0;
 const FRAME: f64 = 1.0 / 60.0;
 
 impl Case {
-    /// A case from `key=value` pairs, units as in the table; `substep` in substeps a second, `damping` and `released` in
-    /// seconds, `full` in percent of EA.
+    /// A case from `key=value` pairs, units as in the table; `substep` in substeps a second, `damping` and `released`
+    /// in seconds, `full` in percent of EA.
     pub fn parse(text: &str) -> anyhow::Result<Case> {
         let mut case = Case::default();
         for (key, value) in assignments(text)? {
@@ -67,7 +77,9 @@ impl Case {
                 "damping" => case.bend_damping = x,
                 "released" => case.released = x,
                 "full" => case.full = x * 1e-2,
-                _ => anyhow::bail!("there is no `{key}`; there are r, e, speed, mu, l, substep, damping, released, full"),
+                _ => {
+                    anyhow::bail!("there is no `{key}`; there are r, e, speed, mu, l, substep, damping, released, full")
+                }
             }
         }
         Ok(case)
@@ -128,11 +140,16 @@ impl Drawn {
         case.length() - self.span
     }
 
-    /// How long the next frame is. The end would otherwise be passed by far: at 1 m/s the ends of the thinnest thread go the length of
-    /// the thread in 1/60 s. A quarter of the way left, and at half the tension a quarter of a percent of the length.
+    /// How long the next frame is. The end would otherwise be passed by far: at 1 m/s the ends of the thinnest thread
+    /// go the length of the thread in 1/60 s. A quarter of the way left, and at half the tension a quarter of a percent
+    /// of the length.
     fn frame(&self, case: &Case) -> f64 {
         let least = 1.5 * case.radius;
-        let way = if self.tension > 0.25 * case.full * self.ea { least } else { least.max(0.1 * (self.left(case) - LEFT * case.radius)) };
+        let way = if self.tension > 0.25 * case.full * self.ea {
+            least
+        } else {
+            least.max(0.1 * (self.left(case) - LEFT * case.radius))
+        };
         FRAME.min(way / (2.0 * case.speed))
     }
 }
@@ -148,14 +165,21 @@ struct Found {
     drawn_frames: usize,
 }
 
-fn draw_and_let_go(case: &Case, s: &mut Session, rod: sutura::Handle<sutura::Rod>, found: &mut Found, trace: &mut dyn FnMut(String)) -> Result<(), String> {
+fn draw_and_let_go(
+    case: &Case,
+    s: &mut Session,
+    rod: sutura::Handle<sutura::Rod>,
+    found: &mut Found,
+    trace: &mut dyn FnMut(String),
+) -> Result<(), String> {
     let text = |e: sutura::Error| e.to_string();
     let knot = |s: &Session, held: bool| {
         let points = s.world.rod(rod).map(|r| r.positions().to_vec()).map_err(text)?;
         Ok::<_, String>(if held { knot_held(&points) } else { knot_free(&points) }.name().to_string())
     };
     found.knots[0] = knot(s, true)?;
-    let ends = [Place::Start, Place::End].map(|place| s.world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).map_err(text));
+    let ends = [Place::Start, Place::End]
+        .map(|place| s.world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).map_err(text));
     let [start, end] = ends;
     let grips = [start?, end?];
     loop {
@@ -180,7 +204,8 @@ fn draw_and_let_go(case: &Case, s: &mut Session, rod: sutura::Handle<sutura::Rod
             found.ended = ended.into();
             break;
         }
-        // From where the ends are, so that the grips do not run away from a solver that is stuck. They turn toward the axis.
+        // From where the ends are, so that the grips do not run away from a solver that is stuck. They turn toward the
+        // axis.
         let mut poses = [s.world.grip_pose(grips[0]).map_err(text)?, s.world.grip_pose(grips[1]).map_err(text)?];
         let axis = (poses[1].position - poses[0].position).normalize();
         for (pose, sign) in poses.iter_mut().zip([-1.0, 1.0]) {
@@ -219,7 +244,11 @@ fn measure(case: &Case, budget: Budget, trace: &mut dyn FnMut(String)) -> Vec<St
     let mut s = Session::new(world, budget);
     if let Err(why) = draw_and_let_go(case, &mut s, rod, &mut found, trace) {
         let stood = match (&found.drawn, found.ended.as_str()) {
-            (Some(d), "") => format!("drawing, T {:.3} % of EA, {:.1} d left", 100.0 * d.tension / d.ea, d.left(case) / (2.0 * case.radius)),
+            (Some(d), "") => format!(
+                "drawing, T {:.3} % of EA, {:.1} d left",
+                100.0 * d.tension / d.ea,
+                d.left(case) / (2.0 * case.radius)
+            ),
             (_, ended) => format!("let go ({ended})"),
         };
         found.ended = format!("{NOT_FINISHED}{why}, at {:.4} s, {stood}", s.world.time());
@@ -319,8 +348,12 @@ impl Study for Overhand {
         let mut out = String::from("# The overhand knot, drawn tight and let go\n\n");
         out.push_str(&summary(table));
         out.push_str("\n## Every case\n\n");
-        let all: Vec<&str> =
-            Self::FACTORS.iter().chain(Self::MEASURES).copied().filter(|c| !["first_incident", "state_hash", "knot_before"].contains(c)).collect();
+        let all: Vec<&str> = Self::FACTORS
+            .iter()
+            .chain(Self::MEASURES)
+            .copied()
+            .filter(|c| !["first_incident", "state_hash", "knot_before"].contains(c))
+            .collect();
         out.push_str(&table.markdown(&all));
         Ok(out)
     }
@@ -352,7 +385,9 @@ fn summary(table: &Table) -> String {
             factor.to_string(),
             level.to_string(),
             count(&|r| table.text(r, ENDED).starts_with(NOT_FINISHED)),
-            count(&|r| table.number(r, "passes_drawn").unwrap_or(0.0) + table.number(r, "passes_released").unwrap_or(0.0) > 0.0),
+            count(&|r| {
+                table.number(r, "passes_drawn").unwrap_or(0.0) + table.number(r, "passes_released").unwrap_or(0.0) > 0.0
+            }),
             count(&|r| knot(r, "knot_before") == knot(r, "knot_tight")),
             numbers("clearance").into_iter().reduce(f64::min).map(|v| format!("{v:.3}")).unwrap_or_default(),
             numbers("strain_error").into_iter().reduce(f64::max).map(|v| format!("{v:.1e}")).unwrap_or_default(),
@@ -378,8 +413,8 @@ fn summary(table: &Table) -> String {
     markdown(&columns, lines.into_iter())
 }
 
-/// The engine's version and the hash of the state that it comes to in a short draw with contacts: what computes otherwise has
-/// another one.
+/// The engine's version and the hash of the state that it comes to in a short draw with contacts: what computes
+/// otherwise has another one.
 pub fn engine() -> String {
     let case = Case { speed: 0.3, ..Case::default() };
     let mut found = Found::default();
@@ -412,9 +447,13 @@ mod tests {
     #[test]
     fn a_case_is_read_back_from_its_levels() {
         for case in Overhand::cases() {
-            let pairs: Vec<String> = Overhand::FACTORS.iter().zip(Overhand::levels(&case)).map(|(f, l)| format!("{f}={l}")).collect();
+            let pairs: Vec<String> =
+                Overhand::FACTORS.iter().zip(Overhand::levels(&case)).map(|(f, l)| format!("{f}={l}")).collect();
             let read = Case::parse(&pairs.join(",")).unwrap();
-            assert!((read.radius / case.radius - 1.0).abs() < 1e-12 && (read.young_modulus / case.young_modulus - 1.0).abs() < 1e-12);
+            assert!(
+                (read.radius / case.radius - 1.0).abs() < 1e-12
+                    && (read.young_modulus / case.young_modulus - 1.0).abs() < 1e-12
+            );
             assert_eq!((read.speed, read.mu, read.element), (case.speed, case.mu, case.element));
         }
         assert!(Case::parse("radius=1").unwrap_err().to_string().contains("substep"));

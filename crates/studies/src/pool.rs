@@ -1,4 +1,5 @@
-//! Many small things played side by side, each on a thread of execution of its own, so that one that panics or hangs is no more than that.
+//! Many small things played side by side, each on a thread of execution of its own, so that one that panics or hangs is
+//! no more than that.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::Range;
@@ -35,7 +36,8 @@ pub fn apart<T: Send + 'static>(limit: Duration, work: impl FnOnce() -> T + Send
     }
 }
 
-/// Plays these numbers, `jobs` at a time, and hands each answer to `take`, in any order; what that says is printed above a bar.
+/// Plays these numbers, `jobs` at a time, and hands each answer to `take`, in any order; what that says is printed
+/// above a bar.
 pub fn play<T: Send + 'static>(
     numbers: Range<u64>,
     jobs: u16,

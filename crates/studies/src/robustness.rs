@@ -1,6 +1,7 @@
-//! Scenes of a generator by the thousand, half of them sensible, half absurd. None may panic, hang, give a number that is not finite or
-//! let a thread pass through something without saying so; each gives the same bits when it is split by snapshot and restore and when what
-//! it consists of is inserted in another order; where nothing does work from outside, energy does not grow.
+//! Scenes of a generator by the thousand, half of them sensible, half absurd. None may panic, hang, give a number that
+//! is not finite or let a thread pass through something without saying so; each gives the same bits when it is split by
+//! snapshot and restore and when what it consists of is inserted in another order; where nothing does work from
+//! outside, energy does not grow.
 
 use anyhow::Context as _;
 use clap::Args;
@@ -51,7 +52,10 @@ fn examine(name: &str, scene: &Scene) -> Seen {
     let split = Player::new(&other, false).and_then(|p| p.play_split(|frame| frame % 3 == 1));
     match split.map(|p| p.world.state_hash()) {
         Ok(hash) if hash == seen.hash => {}
-        Ok(hash) => seen.fault = Some(format!("inserted in another order and split by snapshots: {hash:016x} for {:016x}", seen.hash)),
+        Ok(hash) => {
+            seen.fault =
+                Some(format!("inserted in another order and split by snapshots: {hash:016x} for {:016x}", seen.hash))
+        }
         Err(e) => seen.fault = Some(format!("its own snapshot: {e}")),
     }
     seen
@@ -106,7 +110,8 @@ impl Robustness {
         let (name, scene) = numbered(self.seed, number);
         println!("{name}: {scene:#?}");
         if let Some(path) = &self.record {
-            // What was done until a panic is the panic's own message; what is written is of a scene that comes to its end.
+            // What was done until a panic is the panic's own message; what is written is of a scene that comes to its
+            // end.
             let player = Player::new(&scene, true)?.play();
             let bytes = player.world.recording().map(sutura::input::Recording::to_bytes).unwrap_or_default();
             std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
@@ -154,22 +159,38 @@ impl Found {
     }
 
     fn table(&self, seed: u64) -> String {
-        let mut out =
-            String::from("| scenes | number | frames | substeps | rejected | refused | with an incident | incidents |\n|---|---|---|---|---|---|---|---|\n");
+        let mut out = String::from(
+            "| scenes | number | frames | substeps | rejected | refused | with an incident | incidents |\n|---|---|---|---|---|---|---|---|\n",
+        );
         for (name, s) in &self.sums {
             let incidents: Vec<String> = s.incidents.iter().map(|(kind, n)| format!("{kind} {n}")).collect();
             let incidents = if incidents.is_empty() { "none".into() } else { incidents.join(", ") };
-            out += &format!("| {name} | {} | {} | {} | {} | {} | {} | {incidents} |\n", s.scenes, s.frames, s.substeps, s.rejected, s.refused, s.with_incident);
+            out += &format!(
+                "| {name} | {} | {} | {} | {} | {} | {} | {incidents} |\n",
+                s.scenes, s.frames, s.substeps, s.rejected, s.refused, s.with_incident
+            );
         }
         out.push('\n');
         for (name, s) in &self.sums {
-            for (growth, order) in s.growth.iter().zip(["implicit Euler", "second order"]).filter(|(g, _)| !g.is_empty()) {
+            for (growth, order) in
+                s.growth.iter().zip(["implicit Euler", "second order"]).filter(|(g, _)| !g.is_empty())
+            {
                 let q = |part: f64| quantile(growth, part);
-                out += &format!("energy of {name}, {order}, most growth in a step: median {:.1e}, 99 % {:.1e}, most {:.1e}\n", q(0.5), q(0.99), q(1.0));
+                out += &format!(
+                    "energy of {name}, {order}, most growth in a step: median {:.1e}, 99 % {:.1e}, most {:.1e}\n",
+                    q(0.5),
+                    q(0.99),
+                    q(1.0)
+                );
             }
         }
         out += &format!("most of all in scene {} at {:.4} s\n", self.worst.0, self.worst.2);
-        out += &format!("{} panics, {} hangs, {} other faults; seed {seed}\n", self.panics.len(), self.hangs.len(), self.faults.len());
+        out += &format!(
+            "{} panics, {} hangs, {} other faults; seed {seed}\n",
+            self.panics.len(),
+            self.hangs.len(),
+            self.faults.len()
+        );
         for number in self.panics.iter().chain(&self.hangs).chain(self.faults.iter().map(|(n, _)| n)) {
             out += &format!("again: studies robustness --seed {seed} --only {number}\n");
         }

@@ -56,7 +56,8 @@ pub const NOT_FINISHED: &str = "not finished: ";
 
 /// Runs a study; how many cases it ran.
 pub fn run<S: Study>(plan: &Plan) -> anyhow::Result<usize> {
-    std::fs::create_dir_all(&plan.folder).with_context(|| format!("cannot make the folder {}", plan.folder.display()))?;
+    std::fs::create_dir_all(&plan.folder)
+        .with_context(|| format!("cannot make the folder {}", plan.folder.display()))?;
     let path = plan.folder.join(S::NAME).with_extension("csv");
     let columns: Vec<&str> = S::FACTORS.iter().chain(&OWN).chain(S::MEASURES).copied().collect();
     let table = Table::read_or_new(&path, &columns)?;
@@ -64,7 +65,8 @@ pub fn run<S: Study>(plan: &Plan) -> anyhow::Result<usize> {
     let wanted = |levels: &[String]| plan.only.admits(S::FACTORS, levels);
     let selected: Vec<&S::Case> = cases.iter().filter(|c| wanted(&S::levels(c))).collect();
     anyhow::ensure!(!selected.is_empty(), "no case of the study has these levels");
-    let due: Vec<&S::Case> = selected.into_iter().filter(|c| plan.again || !is_done::<S>(&table, &S::levels(c), plan)).collect();
+    let due: Vec<&S::Case> =
+        selected.into_iter().filter(|c| plan.again || !is_done::<S>(&table, &S::levels(c), plan)).collect();
 
     let bar = ProgressBar::new(due.len() as u64);
     // The template is a constant; a default bar would do as well.
@@ -78,7 +80,8 @@ pub fn run<S: Study>(plan: &Plan) -> anyhow::Result<usize> {
             scope.spawn(|| {
                 while let Some(case) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let levels = S::levels(case);
-                    let name = S::FACTORS.iter().zip(&levels).map(|(f, l)| format!("{f}={l}")).collect::<Vec<_>>().join(",");
+                    let name =
+                        S::FACTORS.iter().zip(&levels).map(|(f, l)| format!("{f}={l}")).collect::<Vec<_>>().join(",");
                     bar.set_message(name.clone());
                     if plan.verbose {
                         bar.suspend(|| eprintln!("{name}"));
@@ -164,7 +167,11 @@ mod tests {
             vec![case.to_string()]
         }
         fn run(case: &u32, budget: Budget, _: &mut dyn FnMut(String)) -> Vec<String> {
-            vec![if case.is_multiple_of(2) || budget.frames >= 10 { "well".into() } else { format!("{NOT_FINISHED}tired") }]
+            vec![if case.is_multiple_of(2) || budget.frames >= 10 {
+                "well".into()
+            } else {
+                format!("{NOT_FINISHED}tired")
+            }]
         }
         fn report(table: &Table, _: &Path) -> anyhow::Result<String> {
             Ok(format!("# Numbers\n\n{}", table.markdown(&["n", ENDED])))
@@ -195,7 +202,11 @@ mod tests {
         assert_eq!(run::<Numbers>(&Plan { again: true, ..plan.clone() }).unwrap(), 2);
         // Another engine.
         assert_eq!(run::<Numbers>(&Plan { engine: "b".into(), ..plan.clone() }).unwrap(), 2);
-        let table = Table::read_or_new(&folder.path().join("numbers.csv"), &["n", "engine", "budget_s", "budget_frames", ENDED]).unwrap();
+        let table = Table::read_or_new(
+            &folder.path().join("numbers.csv"),
+            &["n", "engine", "budget_s", "budget_frames", ENDED],
+        )
+        .unwrap();
         let seen: Vec<(&str, &str)> = table.rows.iter().map(|r| (r[0].as_str(), r[1].as_str())).collect();
         assert_eq!(seen, [("0", "a"), ("1", "a"), ("2", "b"), ("3", "b")]);
         assert!(run::<Numbers>(&Plan { only: Filter::parse("n=7", Numbers::FACTORS).unwrap(), ..plan }).is_err());

@@ -1,7 +1,8 @@
-//! How strong a knot is: tied, drawn to a pretension and let go, then its loop is pulled apart until a tail slips, the knot comes
-//! undone, or the tension passes what the thread bears with a knot in it.
+//! How strong a knot is: tied, drawn to a pretension and let go, then its loop is pulled apart until a tail slips, the
+//! knot comes undone, or the tension passes what the thread bears with a knot in it.
 //!
-//! The pull is one of displacement: the halves of the post part at a steady speed, so that the force is an outcome, also past its peak.
+//! The pull is one of displacement: the halves of the post part at a steady speed, so that the force is an outcome,
+//! also past its peak.
 
 use crate::case::Budget;
 use crate::curve::Stack;
@@ -34,13 +35,17 @@ pub const NAMED: [(&str, &str); 7] = [
 ];
 
 impl Throws {
-    /// A name of [`NAMED`], or throws from the first to the last in the notation of surgeons: 1 is a single throw, 2 a double one, `=`
-    /// before a throw that mirrors the one before, `x` before one of the same hand. The first is right-handed.
+    /// A name of [`NAMED`], or throws from the first to the last in the notation of surgeons: 1 is a single throw, 2 a
+    /// double one, `=` before a throw that mirrors the one before, `x` before one of the same hand. The first is
+    /// right-handed.
     pub fn parse(text: &str) -> Result<Throws, String> {
         let text = text.trim();
         let wanted = || {
             let names: Vec<&str> = NAMED.iter().map(|n| n.0).collect();
-            format!("`{text}` is no sequence of throws: {}, or such as 2=1=1 (digits 1 to 4; `=` mirrors, `x` repeats)", names.join(", "))
+            format!(
+                "`{text}` is no sequence of throws: {}, or such as 2=1=1 (digits 1 to 4; `=` mirrors, `x` repeats)",
+                names.join(", ")
+            )
         };
         let code = NAMED.iter().find(|n| n.0 == text).map_or(text, |n| n.1);
         let (mut half_twists, mut hand) = (Vec::new(), 1);
@@ -79,7 +84,8 @@ pub struct Case {
 /// Kelvin-Voigt relaxation time of bending and twist \[s\], as the scene square_knot; unverified.
 pub const BEND_DAMPING: f64 = 0.01;
 
-/// Plastic set of a thread of this diameter \[m\]: that of the scene square_knot, a strain of 5.6 % at the surface; unverified.
+/// Plastic set of a thread of this diameter \[m\]: that of the scene square_knot, a strain of 5.6 % at the surface;
+/// unverified.
 pub fn set(diameter: f64) -> Plasticity {
     let yields = 0.05625 / (0.5 * diameter);
     Plasticity { yield_curvature: yields, yield_twist: yields, hardening: 0.02 }
@@ -88,14 +94,15 @@ pub fn set(diameter: f64) -> Plasticity {
 /// Radius of the post and length of a tail before the draw, in diameters: what `hold` has with a 3-0 thread.
 const POST: f64 = 9.0;
 const TAIL: f64 = 20.0;
-/// Length of tail drawn through at which a knot usually counts as slipping, in diameters: the 1.8 mm of Silver's tests with 3-0 thread. A
-/// knot that was drawn in one go draws in some of it while it tightens under the first of the load.
+/// Length of tail drawn through at which a knot usually counts as slipping, in diameters: the 1.8 mm of Silver's tests
+/// with 3-0 thread. A knot that was drawn in one go draws in some of it while it tightens under the first of the load.
 pub const SLIP: f64 = 8.0;
-/// Rate at which the loop gets longer while it is pulled, in diameters a second, and by how much at most, in diameters: more than the
-/// tails of a knot hold after the draw.
+/// Rate at which the loop gets longer while it is pulled, in diameters a second, and by how much at most, in diameters:
+/// more than the tails of a knot hold after the draw.
 const PULL_RATE: f64 = 30.0;
 const PULL_LONGEST: f64 = 180.0;
-/// Force behind the pull over twice the strength of the thread: the speed falls by no more than one part in this before the thread breaks.
+/// Force behind the pull over twice the strength of the thread: the speed falls by no more than one part in this before
+/// the thread breaks.
 const PULL_FORCE: f64 = 20.0;
 /// Frames from one recognition of the knot to the next while it is pulled. Its entries are looked for in every frame.
 const RECOGNIZE: u32 = 6;
@@ -208,14 +215,17 @@ impl Case {
             Ok(tied) => tied,
             Err(why) => return Found { ended: Ended::NotFinished(why), ..found },
         };
-        found.ended = self.pull_apart(&mut tied, &mut found).unwrap_or_else(|why| Ended::NotFinished(format!("{why}, at {:.3} s", tied.s.world.time())));
+        found.ended = self
+            .pull_apart(&mut tied, &mut found)
+            .unwrap_or_else(|why| Ended::NotFinished(format!("{why}, at {:.3} s", tied.s.world.time())));
         tied.say(&found.ended.words());
         found.drawn = tied.drawn;
         found.knots[2] = tied.knot().unwrap_or_default();
         (found.passes, _) = tied.s.passes(f64::INFINITY);
         found.clearance = tied.s.clearance();
         found.incidents = tied.s.incidents;
-        (found.simulated, found.cpu, found.state_hash) = (tied.s.world.time(), tied.s.solver_s(), tied.s.world.state_hash());
+        (found.simulated, found.cpu, found.state_hash) =
+            (tied.s.world.time(), tied.s.solver_s(), tied.s.world.state_hash());
         found
     }
 
@@ -261,8 +271,9 @@ impl Case {
     }
 }
 
-/// Runs cases on this many threads of execution; the results are in the order of the cases and do not depend on how many there are, but
-/// for the CPU times and where a budget of CPU time ends a case. `done` is told of each case when it is done.
+/// Runs cases on this many threads of execution; the results are in the order of the cases and do not depend on how
+/// many there are, but for the CPU times and where a budget of CPU time ends a case. `done` is told of each case when
+/// it is done.
 pub fn run(cases: &[Case], budget: Budget, threads: usize, done: &(dyn Fn(&Case, &Found) + Sync)) -> Vec<Found> {
     let (next, all) = (AtomicUsize::new(0), Mutex::new(vec![None; cases.len()]));
     std::thread::scope(|scope| {
@@ -309,8 +320,22 @@ const COLUMNS: [&str; 24] = [
     "state_hash",
 ];
 /// Those that are read by eye.
-const SHORT: [&str; 14] =
-    ["throws", "pretension_n", "mu", "ended", "held_n", "slipped_mm", "peak_n", "growth_mm", "loop_tension_n", "form", "share", "form_held", "passes", "cpu_s"];
+const SHORT: [&str; 14] = [
+    "throws",
+    "pretension_n",
+    "mu",
+    "ended",
+    "held_n",
+    "slipped_mm",
+    "peak_n",
+    "growth_mm",
+    "loop_tension_n",
+    "form",
+    "share",
+    "form_held",
+    "passes",
+    "cpu_s",
+];
 
 /// One row a case.
 pub fn table(cases: &[Case], found: &[Found]) -> Table {
@@ -362,8 +387,8 @@ pub fn pulls(cases: &[Case], found: &[Found]) -> Table {
     table
 }
 
-/// A report in Markdown: for each sequence of throws and pretension what became of it over the friction, then every case. `picture` is the
-/// stem of the plots beside it.
+/// A report in Markdown: for each sequence of throws and pretension what became of it over the friction, then every
+/// case. `picture` is the stem of the plots beside it.
 pub fn report(cases: &[Case], found: &[Found], head: &str, picture: &str) -> String {
     let mut out = format!(
         "# Strength of knots\n\n{head}\n\n![Force that the loop holds until a tail slips]({picture}.svg)\n\n![Greatest force until it comes undone or breaks]({picture}_peak.svg)\n\n"
@@ -373,10 +398,16 @@ pub fn report(cases: &[Case], found: &[Found], head: &str, picture: &str) -> Str
     mus.dedup();
     let mut groups: Vec<(&str, f64)> = cases.iter().map(|c| (c.throws.name.as_str(), c.pretension)).collect();
     groups.dedup();
-    let heads: Vec<String> = ["throws", "pretension [N] \\ mu"].into_iter().map(str::to_string).chain(mus.iter().map(f64::to_string)).collect();
+    let heads: Vec<String> = ["throws", "pretension [N] \\ mu"]
+        .into_iter()
+        .map(str::to_string)
+        .chain(mus.iter().map(f64::to_string))
+        .collect();
     let heads: Vec<&str> = heads.iter().map(String::as_str).collect();
     let cell = |(throws, pretension): (&str, f64), mu: f64| {
-        let of = |c: &Case| c.throws.name == throws && c.pretension.to_bits() == pretension.to_bits() && c.mu.to_bits() == mu.to_bits();
+        let of = |c: &Case| {
+            c.throws.name == throws && c.pretension.to_bits() == pretension.to_bits() && c.mu.to_bits() == mu.to_bits()
+        };
         let Some(k) = cases.iter().position(of) else { return String::new() };
         let f = &found[k];
         match f.ended {
@@ -388,14 +419,20 @@ pub fn report(cases: &[Case], found: &[Found], head: &str, picture: &str) -> Str
         }
     };
     out.push_str("Force on the loop \\[N\\] until a tail slips; the most it holds until it comes undone, or at which the thread breaks:\n\n");
-    out.push_str(&markdown(&heads, groups.iter().map(|g| [g.0.to_string(), g.1.to_string()].into_iter().chain(mus.iter().map(|mu| cell(*g, *mu))).collect())));
+    out.push_str(&markdown(
+        &heads,
+        groups.iter().map(|g| {
+            [g.0.to_string(), g.1.to_string()].into_iter().chain(mus.iter().map(|mu| cell(*g, *mu))).collect()
+        }),
+    ));
     out.push_str("\n## Every case\n\n");
     out.push_str(&table(cases, found).markdown(&SHORT));
     out
 }
 
-/// Length of tail that went into the knot: of the tail that lost more \[m\]. An entry jumps where a tail that lies along the knot comes off
-/// it; what passes through the knot lengthens the loop, whose growth is therefore a bound of the slip.
+/// Length of tail that went into the knot: of the tail that lost more \[m\]. An entry jumps where a tail that lies
+/// along the knot comes off it; what passes through the knot lengthens the loop, whose growth is therefore a bound of
+/// the slip.
 fn taken_in(before: &Entries, now: &Entries) -> f64 {
     (before.tail_a - now.tail_a).max(now.tail_b - before.tail_b)
 }
@@ -423,7 +460,10 @@ mod tests {
     #[test]
     fn results_do_not_depend_on_the_number_of_threads() {
         let preset = sutura_scene::presets::find_material("silk").unwrap();
-        let material = Material { bend_scale: preset.bend_scale.value, ..Material::elastic(preset.young_modulus.value, preset.density.value) };
+        let material = Material {
+            bend_scale: preset.bend_scale.value,
+            ..Material::elastic(preset.young_modulus.value, preset.density.value)
+        };
         let case = |throws: &str, mu: f64| Case {
             material: material.clone(),
             diameter: 0.225e-3,
@@ -449,7 +489,11 @@ mod tests {
         assert_ne!(one[0].last(), one[1].last(), "each case has its own last state");
         assert!(one.iter().all(|row| row[3] == "not finished: over 3 frames, at 0.050 s"), "{one:?}");
         let text = report(&cases, &run(&cases, budget, 2, &|_, _| {}), "Head.", "stem");
-        assert!(text.contains("| 1x1 | 1 | not finished |  |  |") && text.contains("![Force that the loop holds until a tail slips](stem.svg)"), "{text}");
+        assert!(
+            text.contains("| 1x1 | 1 | not finished |  |  |")
+                && text.contains("![Force that the loop holds until a tail slips](stem.svg)"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! Thousands of throws of thread at, over, through and into shapes, fixed, driven and pushed ([`sutura_generated::throw`]). Each begins free of
-//! overlap and has a way to go on, so no thread may pass through anything, no incident may arise, and all of its time must be simulated.
+//! Thousands of throws of thread at, over, through and into shapes, fixed, driven and pushed
+//! ([`sutura_generated::throw`]). Each begins free of overlap and has a way to go on, so no thread may pass through
+//! anything, no incident may arise, and all of its time must be simulated.
 
 use anyhow::Context as _;
 use clap::Args;
@@ -79,7 +80,8 @@ pub struct Seen {
     pub worst: f64,
 }
 
-/// Part of the energy turned over by which it may be above its start, that of contacts pressed in and of lengths within the tolerance.
+/// Part of the energy turned over by which it may be above its start, that of contacts pressed in and of lengths within
+/// the tolerance.
 pub const GAIN: f64 = 0.02;
 
 /// Clearance under which things have touched: some is kept between them.
@@ -318,7 +320,9 @@ impl Throws {
             (throw.family.name(), throw.how.name(), examine(&throw, budget, &mut |_| {}))
         };
         let numbers = self.first..self.first.saturating_add(self.count);
-        pool::play(numbers, self.jobs, Duration::from_secs_f64(self.limit), play, |number, ended| found.take(number, ended).filter(|_| self.verbose));
+        pool::play(numbers, self.jobs, Duration::from_secs_f64(self.limit), play, |number, ended| {
+            found.take(number, ended).filter(|_| self.verbose)
+        });
         print!("{}", found.table(self.seed));
         Ok(found.is_clean())
     }
@@ -332,7 +336,12 @@ impl Throws {
             std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))?;
         }
         let seen = examine(&throw, self.budget, &mut |line| println!("{line}"));
-        println!("{seen:#?}\n{} {}: {}", throw.family.name(), throw.how.name(), seen.fault().unwrap_or_else(|| "as it must be".into()));
+        println!(
+            "{seen:#?}\n{} {}: {}",
+            throw.family.name(),
+            throw.how.name(),
+            seen.fault().unwrap_or_else(|| "as it must be".into())
+        );
         Ok(seen.fault().is_none())
     }
 }
@@ -368,7 +377,12 @@ impl Found {
         let ways = self.ways.iter().map(|(name, sums)| sums.row(name));
         let mut out = markdown(&COLUMNS, families.chain(ways).chain([self.all.row("all")]));
         out += &format!("{} panics, {} hangs; seed {seed}\n", self.panics.len(), self.hangs.len());
-        for (what, numbers) in [("panicked", &self.panics), ("hangs", &self.hangs), ("passes through", &self.passed), ("fails otherwise", &self.others)] {
+        for (what, numbers) in [
+            ("panicked", &self.panics),
+            ("hangs", &self.hangs),
+            ("passes through", &self.passed),
+            ("fails otherwise", &self.others),
+        ] {
             let mut numbers = numbers.clone();
             numbers.sort_unstable();
             for number in numbers.iter().take(MOST_NAMED) {

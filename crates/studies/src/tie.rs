@@ -1,12 +1,15 @@
-//! A loose knot around a post in two halves, drawn tight by its tails and let go; the halves of the post then load its loop. What the
-//! studies of knots that hold have in common.
+//! A loose knot around a post in two halves, drawn tight by its tails and let go; the halves of the post then load its
+//! loop. What the studies of knots that hold have in common.
 
 use crate::case::Budget;
 use crate::curve::{Stack, knot_free};
 use crate::session::Session;
 use sutura::glam::DVec3;
 use sutura::knot::{Entries, Form, entries, form};
-use sutura::{Drive, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, RodView, Settings, Shape, ShapeMotion, ShapeSpec, World};
+use sutura::{
+    Drive, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, RodView, Settings, Shape,
+    ShapeMotion, ShapeSpec, World,
+};
 
 /// What is tied.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,8 +32,8 @@ const MU_POST: f64 = 0.15;
 const POST_HALF_LENGTH: f64 = 10.0;
 /// Speed at which a tail is drawn when nothing resists \[m/s\].
 const DRAW_SPEED: f64 = 0.03;
-/// Force on the halves of the post that keeps the loop taut while the tails are drawn, and to which it rises when they are, so that the
-/// first throws get tight too; over the force on the tails.
+/// Force on the halves of the post that keeps the loop taut while the tails are drawn, and to which it rises when they
+/// are, so that the first throws get tight too; over the force on the tails.
 const COUNTER: (f64, f64) = (0.25, 1.0);
 /// Speed at which a half of the post is pushed meanwhile when nothing resists \[m/s\].
 const PUSH_SPEED: f64 = 0.005;
@@ -63,14 +66,24 @@ impl<'a> Tied<'a> {
     /// The loose knot. `trace` takes lines that say how it goes.
     pub fn new(spec: &Spec, budget: Budget, trace: &'a mut dyn FnMut(String)) -> Result<Self, String> {
         let text = |e: sutura::Error| e.to_string();
-        let settings = Settings { gravity: DVec3::ZERO, substep: spec.substep, linear_damping: 0.9, angular_damping: 0.9, ..Settings::default() };
+        let settings = Settings {
+            gravity: DVec3::ZERO,
+            substep: spec.substep,
+            linear_damping: 0.9,
+            angular_damping: 0.9,
+            ..Settings::default()
+        };
         let mut world = World::new(settings).map_err(text)?;
         world.set_friction(THREAD_SURFACE, THREAD_SURFACE, Friction::coulomb(spec.mu)).map_err(text)?;
         world.set_friction(THREAD_SURFACE, POST_SURFACE, Friction::coulomb(MU_POST)).map_err(text)?;
         let Stack { diameter, post: radius, .. } = spec.stack;
-        let thread = RodSpec::new(spec.stack.centerline(spec.element * diameter), 0.5 * diameter, spec.material.clone());
+        let thread =
+            RodSpec::new(spec.stack.centerline(spec.element * diameter), 0.5 * diameter, spec.material.clone());
         let rod = world.insert_rod(&RodSpec { surface: THREAD_SURFACE, ..thread }).map_err(text)?;
-        let post = ShapeSpec::fixed(Geometry::Cylinder { radius, half_length: POST_HALF_LENGTH * radius }, Pose::at(DVec3::ZERO));
+        let post = ShapeSpec::fixed(
+            Geometry::Cylinder { radius, half_length: POST_HALF_LENGTH * radius },
+            Pose::at(DVec3::ZERO),
+        );
         let post = ShapeSpec { surface: POST_SURFACE, ..post };
         let posts = [world.insert_shape(&post).map_err(text)?, world.insert_shape(&post).map_err(text)?];
         Ok(Tied { s: Session::new(world, budget), rod, posts, drawn: 0.0, trace })
@@ -155,8 +168,8 @@ impl<'a> Tied<'a> {
         Ok(())
     }
 
-    /// Draws the tails apart by force, tightens the loop against them, and lets the tails go, with the halves of the post fixed. What the
-    /// knot was when drawn.
+    /// Draws the tails apart by force, tightens the loop against them, and lets the tails go, with the halves of the
+    /// post fixed. What the knot was when drawn.
     pub fn draw(&mut self, force: f64) -> Result<String, String> {
         let text = |e: sutura::Error| e.to_string();
         let x = self.rod()?.positions();
@@ -164,7 +177,12 @@ impl<'a> Tied<'a> {
         let mut grips = Vec::new();
         for (place, direction) in [Place::Start, Place::End].into_iter().zip(outward) {
             let drive = Drive::Force { direction, force, speed_limit: DRAW_SPEED };
-            grips.push(self.s.world.insert_grip(&GripSpec { drive, ..GripSpec::at_once(self.rod, place, Hold::Pin) }).map_err(text)?);
+            grips.push(
+                self.s
+                    .world
+                    .insert_grip(&GripSpec { drive, ..GripSpec::at_once(self.rod, place, Hold::Pin) })
+                    .map_err(text)?,
+            );
         }
         self.push(COUNTER.0 * force, PUSH_SPEED)?;
         let pull = |s: &Session, k: usize| s.world.grip_wrench(grips[k]).map(|w| w.force.dot(outward[k])).map_err(text);

@@ -8,7 +8,14 @@ fn no_throw_passes_through() {
     for number in 0..4 * FAMILIES.len() as u64 {
         let throw = numbered(1, number);
         let seen = examine(&throw, 10.0, &mut |_| {});
-        assert_eq!(seen.passages, 0, "throw {number} ({}, {}): {:?}", throw.family.name(), throw.how.name(), seen.first_passage);
+        assert_eq!(
+            seen.passages,
+            0,
+            "throw {number} ({}, {}): {:?}",
+            throw.family.name(),
+            throw.how.name(),
+            seen.first_passage
+        );
     }
 }
 

@@ -1,10 +1,11 @@
-//! What can be typed. The texts here are the manual of the program: each command says what it reads, what it writes and what its
-//! exit code means, and shows examples.
+//! What can be typed. The texts here are the manual of the program: each command says what it reads, what it writes and
+//! what its exit code means, and shows examples.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Real-time simulator of surgical thread: it ties knots that hold by friction, says which knot it is and measures the forces.
+/// Real-time simulator of surgical thread: it ties knots that hold by friction, says which knot it is and measures the
+/// forces.
 #[derive(Parser, Debug)]
 #[command(name = "sutura", version, arg_required_else_help = false, subcommand_required = false, after_help = EXAMPLES)]
 pub struct Cli {
@@ -102,8 +103,9 @@ pub struct Run {
     /// Folder for the results [default: out/<scene>]
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Value for a key of the scene instead of its own, for instance `thread.silk.elements=50`: names with points between them, an
-    /// entry without a name by its number, as in `phase[0].action[1].force`; may be given several times
+    /// Value for a key of the scene instead of its own, for instance `thread.silk.elements=50`: names with points
+    /// between them, an entry without a name by its number, as in `phase[0].action[1].force`; may be given several
+    /// times
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = setting)]
     pub settings: Vec<(String, String)>,
     /// Draw no plots
@@ -124,7 +126,8 @@ pub struct Run {
     /// Size of the pictures in pixels
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1200x900", value_parser = size)]
     pub picture_size: (u32, u32),
-    /// Direction in which the pictures look, for instance `0,1,-0.5` [default: the scene's, or one from which the knot is seen well]
+    /// Direction in which the pictures look, for instance `0,1,-0.5` [default: the scene's, or one from which the knot
+    /// is seen well]
     #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
     pub look: Option<[f64; 3]>,
     /// Record what is done to the world, with the state hash after every step, as input.sutura for `sutura replay`
@@ -212,7 +215,8 @@ pub struct Knot {
     /// Thread of a trajectory, by name [default: the first]
     #[arg(long, value_name = "NAME")]
     pub thread: Option<String>,
-    /// Diameter of the thread in the unit of the points, to tell a flat knot from a capsized one [default: that of the trajectory]
+    /// Diameter of the thread in the unit of the points, to tell a flat knot from a capsized one [default: that of the
+    /// trajectory]
     #[arg(long, value_name = "D", value_parser = positive)]
     pub diameter: Option<f64>,
     /// Seed of the random views and closures
@@ -297,7 +301,8 @@ pub struct KnotStrength {
     /// Bends and twist become permanent beyond a strain of 5.6 % at the surface
     #[arg(long)]
     pub plastic: bool,
-    /// Length of tail drawn through at which a knot counts as slipping, in diameters; 8 are the 1.8 mm of surgical tests with 3-0 thread
+    /// Length of tail drawn through at which a knot counts as slipping, in diameters; 8 are the 1.8 mm of surgical
+    /// tests with 3-0 thread
     #[arg(long, value_name = "DIAMETERS", default_value_t = sutura_studies::strength::SLIP, value_parser = positive)]
     pub slip: f64,
     /// CPU time after which a case is given up [s]
@@ -639,7 +644,9 @@ mod tests {
         assert_eq!(direction("0,1,-0.5"), Ok([0.0, 1.0, -0.5]));
         assert!(direction("0,0,0").is_err() && direction("1,2").is_err() && direction("nan,0,1").is_err());
         assert_eq!((force("2"), force("50 mN"), length("2mm")), (Ok(2.0), Ok(0.05), Ok(2e-3)));
-        assert!(force("2 mm").is_err() && force("0 N").is_err() && friction("1.5").is_err() && positive("nan").is_err());
+        assert!(
+            force("2 mm").is_err() && force("0 N").is_err() && friction("1.5").is_err() && positive("nan").is_err()
+        );
         assert!(time("-1").is_err() && time("inf").is_err() && time("2.5") == Ok(2.5));
     }
 }

@@ -1,5 +1,5 @@
-//! The command `sutura bench`: how fast is this build on this machine? Times are CPU times of the solver on one core, so that
-//! another program on the same machine costs little.
+//! The command `sutura bench`: how fast is this build on this machine? Times are CPU times of the solver on one core,
+//! so that another program on the same machine costs little.
 
 use crate::args::{Bench, FreeShape};
 use crate::{run, say, say_json, table};
@@ -66,7 +66,8 @@ struct FreeSwing {
     newton_per_frame: f64,
     ms_median: f64,
     ms_p99: f64,
-    /// Root mean square distance of the end from the converged path, with drag over 2 s and without over half a second \[mm\].
+    /// Root mean square distance of the end from the converged path, with drag over 2 s and without over half a second
+    /// \[mm\].
     drag_rms_mm: f64,
     free_rms_mm: f64,
 }
@@ -93,7 +94,8 @@ const RADIUS: f64 = 1e-4;
 pub fn bench(args: &Bench) -> anyhow::Result<()> {
     let counts = if args.elements.is_empty() { vec![40, 120, 500, 2000] } else { args.elements.clone() };
     let shapes = args.shape.map_or_else(|| vec![FreeShape::Straight, FreeShape::Helix], |s| vec![s]);
-    let mut measured = Measured { machine: machine(), free_thread: Vec::new(), free_swing: Vec::new(), skin: None, knots: Vec::new() };
+    let mut measured =
+        Measured { machine: machine(), free_thread: Vec::new(), free_swing: Vec::new(), skin: None, knots: Vec::new() };
     if !args.knots {
         for shape in shapes {
             for &n in &counts {
@@ -116,11 +118,21 @@ pub fn bench(args: &Bench) -> anyhow::Result<()> {
 fn skin() -> anyhow::Result<SkinTime> {
     let material = Material::elastic(1e9, 1150.0);
     let mut world = World::new(Settings::default())?;
-    let rod = world.insert_rod(&RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * 3e-3, 6.0, LENGTH / 30.0, 192, RADIUS, material))?;
+    let rod = world.insert_rod(&RodSpec::helix(
+        DVec3::ZERO,
+        DVec3::X,
+        DVec3::Y * 3e-3,
+        6.0,
+        LENGTH / 30.0,
+        192,
+        RADIUS,
+        material,
+    ))?;
     let view = world.rod(rod)?;
     let skin = Skin::new(&SkinSpec::of(&view))?;
     let n = skin.n_vertices();
-    let (mut bones, mut positions, mut normals) = (vec![Bone::default(); skin.n_bones()], vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
+    let (mut bones, mut positions, mut normals) =
+        (vec![Bone::default(); skin.n_bones()], vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
     let mut ms: Vec<f64> = (0..500)
         .map(|_| {
             let start = ThreadTime::now();
@@ -180,9 +192,12 @@ const SWINGS: [(f64, usize); 2] = [(4.0, 120), (0.0, 30)];
 fn free_swings() -> anyhow::Result<Vec<FreeSwing>> {
     let converged = SWINGS.map(|(drag, frames)| swing(Integrator::TrBdf2, 64, 1e-5, drag, frames));
     let mut out = Vec::new();
-    for (integrator, name, counts) in [(Integrator::ImplicitEuler, "implicit Euler", [4, 8, 16]), (Integrator::TrBdf2, "TR-BDF2", [2, 4, 6])] {
+    for (integrator, name, counts) in
+        [(Integrator::ImplicitEuler, "implicit Euler", [4, 8, 16]), (Integrator::TrBdf2, "TR-BDF2", [2, 4, 6])]
+    {
         for substeps in counts {
-            let [drag, free] = SWINGS.map(|(drag, frames)| swing(integrator, substeps, Settings::default().tolerance, drag, frames));
+            let [drag, free] =
+                SWINGS.map(|(drag, frames)| swing(integrator, substeps, Settings::default().tolerance, drag, frames));
             let (mut drag, free) = (drag?, free?);
             let [with, without] = converged.each_ref().map(|c| c.as_ref().map_or(&[][..], |c| &c.path));
             out.push(FreeSwing {
@@ -209,7 +224,13 @@ struct Swing {
 fn swing(integrator: Integrator, substeps: u32, tolerance: f64, drag: f64, frames: usize) -> anyhow::Result<Swing> {
     const ELEMENTS: usize = 120;
     let linear_damping = -(-drag).exp_m1();
-    let mut world = World::new(Settings { substep: FRAME / f64::from(substeps), integrator, tolerance, linear_damping, ..Settings::default() })?;
+    let mut world = World::new(Settings {
+        substep: FRAME / f64::from(substeps),
+        integrator,
+        tolerance,
+        linear_damping,
+        ..Settings::default()
+    })?;
     let material = Material { shear: Shear::Modulus(1e7 / 3.0), ..Material::elastic(1e7, 1000.0) };
     let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * LENGTH, ELEMENTS, 0.25e-3, material))?;
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp))?;
@@ -285,10 +306,23 @@ fn quantile(values: &mut [f64], q: f64) -> f64 {
 fn as_tables(m: &Measured) -> String {
     let machine = &m.machine;
     let cores = if machine.cores == 1 { "1 core".to_string() } else { format!("{} cores", machine.cores) };
-    let mut out = format!("{}, {cores} (one used), {}; sutura {}, {} build\n", machine.cpu, machine.system, machine.version, machine.build);
+    let mut out = format!(
+        "{}, {cores} (one used), {}; sutura {}, {} build\n",
+        machine.cpu, machine.system, machine.version, machine.build
+    );
     if !m.free_thread.is_empty() {
         let mut t = table(
-            &["free thread", "elements", "ms/frame median", "p99", "substeps/frame", "Newton/frame", "ns/element/iteration", "max elongation", "incidents"],
+            &[
+                "free thread",
+                "elements",
+                "ms/frame median",
+                "p99",
+                "substeps/frame",
+                "Newton/frame",
+                "ns/element/iteration",
+                "max elongation",
+                "incidents",
+            ],
             &[1, 2, 3, 4, 5, 6, 7, 8],
         );
         for f in &m.free_thread {
@@ -304,11 +338,23 @@ fn as_tables(m: &Measured) -> String {
                 f.incidents.to_string(),
             ]);
         }
-        out.push_str(&format!("\n{:.0} cm, radius {} mm, one end pinned, dropped, 60 frames/s\n{t}\n", 100.0 * LENGTH, 1e3 * RADIUS));
+        out.push_str(&format!(
+            "\n{:.0} cm, radius {} mm, one end pinned, dropped, 60 frames/s\n{t}\n",
+            100.0 * LENGTH,
+            1e3 * RADIUS
+        ));
     }
     if !m.free_swing.is_empty() {
         let mut t = table(
-            &["free swing", "substeps/frame", "Newton/frame", "ms/frame median", "p99", "off [mm], drag 4/s, 2 s", "off [mm], no drag, 0.5 s"],
+            &[
+                "free swing",
+                "substeps/frame",
+                "Newton/frame",
+                "ms/frame median",
+                "p99",
+                "off [mm], drag 4/s, 2 s",
+                "off [mm], no drag, 0.5 s",
+            ],
             &[1, 2, 3, 4, 5, 6],
         );
         for f in &m.free_swing {
@@ -332,7 +378,17 @@ fn as_tables(m: &Measured) -> String {
     }
     if !m.knots.is_empty() {
         let mut t = table(
-            &["knot", "elements", "ms/frame median", "p99", "most contacts", "ns/contact/iteration", "real-time factor", "worst second", "checks"],
+            &[
+                "knot",
+                "elements",
+                "ms/frame median",
+                "p99",
+                "most contacts",
+                "ns/contact/iteration",
+                "real-time factor",
+                "worst second",
+                "checks",
+            ],
             &[1, 2, 3, 4, 5, 6, 7],
         );
         for k in &m.knots {

@@ -26,7 +26,10 @@ pub fn export(args: &Export) -> anyhow::Result<()> {
     let format = match (args.format, by_name) {
         (Some(format), _) => format.into(),
         (None, Some(format)) => format,
-        (None, None) => bail!("which format? Give `--format glb` (or vtk, obj, csv), or a file name that says it: `--out {}.glb`", header.scene),
+        (None, None) => bail!(
+            "which format? Give `--format glb` (or vtk, obj, csv), or a file name that says it: `--out {}.glb`",
+            header.scene
+        ),
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&header.scene, format));
     let up = match args.up {
@@ -34,7 +37,14 @@ pub fn export(args: &Export) -> anyhow::Result<()> {
         Axis::Y => DVec3::Y,
         Axis::Z => DVec3::Z,
     };
-    let options = Options { rate: args.fps, from: args.from, to: args.to.unwrap_or(f64::INFINITY), sides: args.sides.into(), rings: args.rings.into(), up };
+    let options = Options {
+        rate: args.fps,
+        from: args.from,
+        to: args.to.unwrap_or(f64::INFINITY),
+        sides: args.sides.into(),
+        rings: args.rings.into(),
+        up,
+    };
     let mut exporter = Exporter::new(format, &header, &out, options)?;
     let written = match source {
         Source::Recording(t) => {

@@ -61,8 +61,10 @@ pub fn knot(args: &Knot) -> anyhow::Result<u8> {
     if let Some(name) = &args.expect {
         let known = || KnotType::NAMES.into_iter().chain(["unnamed", "unknown"]);
         if !known().any(|n| n == name) {
-            let near = crate::nearest(name, known())
-                .map_or_else(|| format!("there are {}", known().collect::<Vec<_>>().join(", ")), |n| format!("did you mean `{n}`?"));
+            let near = crate::nearest(name, known()).map_or_else(
+                || format!("there are {}", known().collect::<Vec<_>>().join(", ")),
+                |n| format!("did you mean `{n}`?"),
+            );
             bail!("no knot is called `{name}`; {near}");
         }
     }
@@ -129,12 +131,19 @@ fn words(a: &Answer<'_>) -> String {
         line("Alexander", a.alexander.iter().map(i64::to_string).collect::<Vec<_>>().join(" "));
     }
     line("crossings", format!("{} after simplification", a.crossings));
-    let trimmed = if a.trimmed > 0.0 { format!(", {:.0} % trimmed from each end", 100.0 * a.trimmed) } else { String::new() };
-    line("agreement", format!("{} of {} views, {} of {} closures{trimmed}", a.views_agreed, a.views, a.closures_agreed, a.closures));
+    let trimmed =
+        if a.trimmed > 0.0 { format!(", {:.0} % trimmed from each end", 100.0 * a.trimmed) } else { String::new() };
+    line(
+        "agreement",
+        format!("{} of {} views, {} of {} closures{trimmed}", a.views_agreed, a.views, a.closures_agreed, a.closures),
+    );
     if let Some(form) = &a.form {
         let straight = form.straight.map_or_else(String::new, |end| format!(", the strand of the {end} is straight"));
         let [a, b] = form.turning_rad.map(f64::to_degrees);
-        line("form", format!("{}{straight}; strands turn by {a:.0} and {b:.0} deg, share {:.2}", form.verdict, form.share));
+        line(
+            "form",
+            format!("{}{straight}; strands turn by {a:.0} and {b:.0} deg, share {:.2}", form.verdict, form.share),
+        );
     }
     if let Some(problem) = &a.problem {
         line("problem", problem.clone());
@@ -181,7 +190,10 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
     let frame = match (args.frame, args.time) {
         (Some(n), _) => {
             let index = if n < 0 { n + count as i64 } else { n };
-            usize::try_from(index).ok().and_then(|i| trajectory.frames.get(i)).with_context(|| format!("{}: no frame {n}, it has {count}", file.display()))?
+            usize::try_from(index)
+                .ok()
+                .and_then(|i| trajectory.frames.get(i))
+                .with_context(|| format!("{}: no frame {n}, it has {count}", file.display()))?
         }
         (None, Some(time)) => trajectory.nearest(time).with_context(|| format!("{}: no frames", file.display()))?,
         (None, None) => trajectory.frames.last().with_context(|| format!("{}: no frames", file.display()))?,
@@ -207,6 +219,8 @@ fn read(args: &Knot) -> anyhow::Result<Curve> {
 fn held(points: &[DVec3]) -> Ends {
     let middle = points.iter().sum::<DVec3>() / points.len() as f64;
     let (first, last) = (points[0], points[points.len() - 1]);
-    let outward = |end: DVec3, other: DVec3| [end - middle, end - other, DVec3::X].into_iter().find(|d| d.length() > 0.0).unwrap_or(DVec3::X);
+    let outward = |end: DVec3, other: DVec3| {
+        [end - middle, end - other, DVec3::X].into_iter().find(|d| d.length() > 0.0).unwrap_or(DVec3::X)
+    };
     Ends::Held { start: outward(first, last), end: outward(last, first) }
 }

@@ -1,4 +1,5 @@
-//! The command `sutura knot-strength`: at what force knots slip, come undone or break, over friction, throws and pretension.
+//! The command `sutura knot-strength`: at what force knots slip, come undone or break, over friction, throws and
+//! pretension.
 
 use crate::args::KnotStrength;
 use crate::plot::{Figure, Line, number};
@@ -43,7 +44,9 @@ fn cases(args: &KnotStrength) -> anyhow::Result<Vec<Case>> {
     let (size, preset) = (presets::find_size(&args.size)?, presets::find_material(&args.material)?);
     let diameter = args.diameter.unwrap_or(size.diameter.value);
     let strength = args.strength.or(presets::knot_pull(size, Some(preset)).map(|f| f.value));
-    let strength = strength.with_context(|| format!("no limit of knot-pull strength is known for {} of size {}; give --strength", preset.name, size.name))?;
+    let strength = strength.with_context(|| {
+        format!("no limit of knot-pull strength is known for {} of size {}; give --strength", preset.name, size.name)
+    })?;
     let material = Material {
         young_modulus: args.modulus.unwrap_or(preset.young_modulus.value),
         shear: Shear::Poisson(preset.poisson_ratio.value),
@@ -104,7 +107,8 @@ fn head(cases: &[Case], args: &KnotStrength) -> String {
         }
         None => "no plastic set".into(),
     };
-    let thread = if args.diameter.is_some() { args.material.clone() } else { format!("{} {}", args.size, args.material) };
+    let thread =
+        if args.diameter.is_some() { args.material.clone() } else { format!("{} {}", args.size, args.material) };
     format!(
         "Written by `sutura knot-strength`, version {}. Thread: {thread}, diameter {} mm, modulus {} GPa, bending scale {}, {set}; knot-pull strength {} N \
          (the tension at which it counts as broken). A tail slips when {slip} diameters of it were drawn through. Forces are those on the loop, which two strands \
@@ -135,18 +139,25 @@ fn figures(cases: &[Case], found: &[Found]) -> Vec<(String, Figure)> {
         for line in &mut lines {
             line.points.sort_by(|a, b| a.0.total_cmp(&b.0));
         }
-        let marks = cases.first().map(|c| ("twice the knot-pull strength".to_string(), 2.0 * c.strength)).into_iter().collect();
+        let marks =
+            cases.first().map(|c| ("twice the knot-pull strength".to_string(), 2.0 * c.strength)).into_iter().collect();
         let (x, y) = (("friction of thread on thread".into(), String::new()), (y.to_string(), "N".to_string()));
         Figure { title: title.into(), x, y, lines, marks, ..Figure::default() }
     };
     vec![
         (STEM.into(), figure("Force on the loop until a tail slips", "force", &|f| f.held)),
-        (format!("{STEM}_peak"), figure("Greatest force on the loop until it comes undone or breaks", "force", &|f| f.peak)),
+        (
+            format!("{STEM}_peak"),
+            figure("Greatest force on the loop until it comes undone or breaks", "force", &|f| f.peak),
+        ),
     ]
 }
 
 fn summary(cases: &[Case], found: &[Found]) -> String {
-    let mut t = table(&["throws", "pretension [N]", "mu", "slips at [N]", "most [N]", "left in the loop [N]", "form", "ended"], &[1, 2, 3, 4, 5]);
+    let mut t = table(
+        &["throws", "pretension [N]", "mu", "slips at [N]", "most [N]", "left in the loop [N]", "form", "ended"],
+        &[1, 2, 3, 4, 5],
+    );
     for (case, f) in cases.iter().zip(found) {
         t.add_row([
             case.throws.name.clone(),
@@ -160,6 +171,10 @@ fn summary(cases: &[Case], found: &[Found]) -> String {
         ]);
     }
     let passes: usize = found.iter().map(|f| f.passes).sum();
-    let audit = if passes == 0 { "Nothing passed through anything.".to_string() } else { format!("THINGS PASSED THROUGH EACH OTHER {passes} times.") };
+    let audit = if passes == 0 {
+        "Nothing passed through anything.".to_string()
+    } else {
+        format!("THINGS PASSED THROUGH EACH OTHER {passes} times.")
+    };
     format!("{t}\n\n{audit}")
 }

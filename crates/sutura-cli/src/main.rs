@@ -47,7 +47,9 @@ fn main() -> ExitCode {
     };
     ExitCode::from(match done {
         Ok(code) => code,
-        Err(e) if e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) => HOLDS,
+        Err(e) if e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe) => {
+            HOLDS
+        }
         Err(e) => {
             eprintln!("error: {e:#}");
             BAD_INPUT
@@ -74,7 +76,9 @@ fn say_json<T: serde::Serialize>(value: &T) -> anyhow::Result<()> {
 fn table(headings: &[&str], numbers: &[usize]) -> comfy_table::Table {
     let mut table = comfy_table::Table::new();
     let line = comfy_table::LineStyle::none().fill('─').junction('─');
-    table.load_style(comfy_table::TableStyle::new().header_separator(line)).set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
+    table
+        .load_style(comfy_table::TableStyle::new().header_separator(line))
+        .set_content_arrangement(comfy_table::ContentArrangement::Dynamic);
     table.set_header(headings.iter().copied());
     for &column in numbers {
         if let Some(column) = table.column_mut(column) {

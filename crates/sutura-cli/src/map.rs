@@ -40,8 +40,15 @@ fn draw(svg: &mut String, grid: &Grid, (left, top): (f64, f64)) {
     for (row, cells) in grid.cells.iter().enumerate() {
         for (column, (mark, good)) in cells.iter().enumerate() {
             let (x, y) = (left + column as f64 * CELL.0, top + row as f64 * CELL.1);
-            let _ =
-                writeln!(svg, "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>", x + 1.0, y + 1.0, CELL.0 - 2.0, CELL.1 - 2.0, shade(*good));
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" fill=\"{}\"/>",
+                x + 1.0,
+                y + 1.0,
+                CELL.0 - 2.0,
+                CELL.1 - 2.0,
+                shade(*good)
+            );
             text(svg, (x + 0.5 * CELL.0, y + 0.5 * CELL.1 + 4.0), 10, "middle", "", mark);
         }
     }
@@ -59,7 +66,8 @@ fn draw(svg: &mut String, grid: &Grid, (left, top): (f64, f64)) {
 
 fn text(svg: &mut String, (x, y): (f64, f64), size: u32, anchor: &str, more: &str, text: &str) {
     let escaped = text.replace('&', "&amp;").replace('<', "&lt;");
-    let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\"{more}>{escaped}</text>");
+    let _ =
+        writeln!(svg, "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\" text-anchor=\"{anchor}\"{more}>{escaped}</text>");
 }
 
 /// From red (0) over yellow to green (1).

@@ -1,8 +1,9 @@
 //! Files that the program writes, and the folder of a run.
 //!
-//! What an earlier run left in the folder is removed before the next one begins, by a list that the earlier one wrote; no other file is touched. Each file
-//! is moved to its place when it is whole, and the report comes last: a folder with a report has everything that the run left, and one without is of a
-//! run that did not end. The list is locked while a run goes on, so that two do not mix; the lock goes with the process, however that ends.
+//! What an earlier run left in the folder is removed before the next one begins, by a list that the earlier one wrote;
+//! no other file is touched. Each file is moved to its place when it is whole, and the report comes last: a folder with
+//! a report has everything that the run left, and one without is of a run that did not end. The list is locked while a
+//! run goes on, so that two do not mix; the lock goes with the process, however that ends.
 
 use anyhow::{Context as _, bail};
 use std::collections::BTreeSet;
@@ -24,7 +25,8 @@ const FIXED: [&str; 2] = ["trajectory.sutura", "input.sutura"];
 const SUBFOLDERS: [&str; 3] = ["series", "plots", "stills"];
 /// The list of what a run wrote.
 const LIST: &str = ".sutura-run";
-const LIST_HEAD: &str = "# Results of a run of sutura in this folder, which the next run here replaces; locked while one goes on.\n";
+const LIST_HEAD: &str =
+    "# Results of a run of sutura in this folder, which the next run here replaces; locked while one goes on.\n";
 
 /// The folder of a run that is under way.
 pub struct Folder {
@@ -37,19 +39,31 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes the folder, or takes over one that is there: removes the results of the run before, but for the file from which this one starts. An error
-    /// where another run goes on, or where files that are of no run would be in the way; `saves` are the names of states to be written.
+    /// Makes the folder, or takes over one that is there: removes the results of the run before, but for the file from
+    /// which this one starts. An error where another run goes on, or where files that are of no run would be in the
+    /// way; `saves` are the names of states to be written.
     pub fn open(path: &Path, start: Option<&Path>, saves: &[String]) -> anyhow::Result<Folder> {
         std::fs::create_dir_all(path).with_context(|| format!("cannot make the folder {}", path.display()))?;
         let list_path = path.join(LIST);
         let cannot = || format!("cannot write {}", list_path.display());
-        let mut list = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&list_path).with_context(cannot)?;
+        let mut list = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&list_path)
+            .with_context(cannot)?;
         match list.try_lock() {
             Ok(()) => {}
-            Err(TryLockError::WouldBlock) => bail!("another run is writing into {}; wait for it, or choose another folder with --out", path.display()),
+            Err(TryLockError::WouldBlock) => bail!(
+                "another run is writing into {}; wait for it, or choose another folder with --out",
+                path.display()
+            ),
             // Not every file system has locks.
             Err(TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(e)) => return Err(e).with_context(|| format!("cannot lock {}", list_path.display())),
+            Err(TryLockError::Error(e)) => {
+                return Err(e).with_context(|| format!("cannot lock {}", list_path.display()));
+            }
         }
         let mut text = String::new();
         list.read_to_string(&mut text).with_context(|| format!("cannot read {}", list_path.display()))?;
@@ -60,12 +74,19 @@ impl Folder {
         refuse_others(path, &earlier, saves)?;
 
         let start = start.and_then(|s| s.canonicalize().ok());
-        let kept: BTreeSet<String> = earlier.iter().filter(|n| start.is_some() && path.join(n).canonicalize().ok() == start).cloned().collect();
+        let kept: BTreeSet<String> =
+            earlier.iter().filter(|n| start.is_some() && path.join(n).canonicalize().ok() == start).cloned().collect();
         // The report goes first: without it nothing passes for a result.
-        for name in [REPORT].into_iter().chain(earlier.iter().map(String::as_str)).filter(|n| earlier.contains(*n) && !kept.contains(*n)) {
+        for name in [REPORT]
+            .into_iter()
+            .chain(earlier.iter().map(String::as_str))
+            .filter(|n| earlier.contains(*n) && !kept.contains(*n))
+        {
             for file in [path.join(name), path.join(format!("{name}{PARTIAL}"))] {
                 match std::fs::remove_file(&file) {
-                    Err(e) if e.kind() != ErrorKind::NotFound => return Err(e).with_context(|| format!("cannot remove {} of an earlier run", file.display())),
+                    Err(e) if e.kind() != ErrorKind::NotFound => {
+                        return Err(e).with_context(|| format!("cannot remove {} of an earlier run", file.display()));
+                    }
                     _ => {}
                 }
             }
@@ -75,7 +96,10 @@ impl Folder {
             let _ = std::fs::remove_dir(path.join(name));
         }
         let head = kept.iter().fold(LIST_HEAD.to_owned(), |text, name| text + name + "\n");
-        list.set_len(0).and_then(|()| list.rewind()).and_then(|()| list.write_all(head.as_bytes())).with_context(cannot)?;
+        list.set_len(0)
+            .and_then(|()| list.rewind())
+            .and_then(|()| list.write_all(head.as_bytes()))
+            .with_context(cannot)?;
         Ok(Folder { path: path.into(), list, names: kept.clone(), kept })
     }
 
@@ -88,10 +112,15 @@ impl Folder {
                 bail!("two results would be called {}", path.display());
             }
             if path.symlink_metadata().is_ok() {
-                bail!("{} is there, and not of an earlier run: move it away, or choose another folder with --out", path.display());
+                bail!(
+                    "{} is there, and not of an earlier run: move it away, or choose another folder with --out",
+                    path.display()
+                );
             }
             // Before the file, so that it is known to the next run whatever happens.
-            self.list.write_all(format!("{name}\n").as_bytes()).with_context(|| format!("cannot write {}", self.path.join(LIST).display()))?;
+            self.list
+                .write_all(format!("{name}\n").as_bytes())
+                .with_context(|| format!("cannot write {}", self.path.join(LIST).display()))?;
         }
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
@@ -102,7 +131,9 @@ impl Folder {
 
 /// Whether a name leads to a file within the folder; a list may have been changed.
 fn is_inside(name: &str) -> bool {
-    !name.is_empty() && !name.starts_with('#') && Path::new(name).components().all(|c| matches!(c, Component::Normal(_)))
+    !name.is_empty()
+        && !name.starts_with('#')
+        && Path::new(name).components().all(|c| matches!(c, Component::Normal(_)))
 }
 
 /// Whether a file is a report of a run.
@@ -138,9 +169,13 @@ fn refuse_others(path: &Path, earlier: &BTreeSet<String>, saves: &[String]) -> a
     }
     let fixed = [REPORT].into_iter().chain(FIXED).map(str::to_owned).chain(saves.iter().cloned());
     let there = fixed.filter(|n| path.join(n).symlink_metadata().is_ok()).chain(in_subfolders(path));
-    let is_known = |name: &String| earlier.contains(name) || name.strip_suffix(PARTIAL).is_some_and(|n| earlier.contains(n));
+    let is_known =
+        |name: &String| earlier.contains(name) || name.strip_suffix(PARTIAL).is_some_and(|n| earlier.contains(n));
     match there.into_iter().find(|n| !is_known(n)) {
-        Some(name) => bail!("{} is not of an earlier run: move it away, or choose another folder with --out", path.join(name).display()),
+        Some(name) => bail!(
+            "{} is not of an earlier run: move it away, or choose another folder with --out",
+            path.join(name).display()
+        ),
         None => Ok(()),
     }
 }
@@ -151,7 +186,13 @@ mod tests {
 
     fn listing(folder: &Path) -> Vec<String> {
         let mut names = in_subfolders(folder);
-        names.extend(std::fs::read_dir(folder).unwrap().map(|e| e.unwrap()).filter(|e| e.path().is_file()).map(|e| e.file_name().to_string_lossy().into()));
+        names.extend(
+            std::fs::read_dir(folder)
+                .unwrap()
+                .map(|e| e.unwrap())
+                .filter(|e| e.path().is_file())
+                .map(|e| e.file_name().to_string_lossy().into()),
+        );
         names.sort();
         names
     }

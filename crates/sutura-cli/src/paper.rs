@@ -56,7 +56,8 @@ fn chosen(names: &[String]) -> anyhow::Result<Vec<Experiment>> {
     for name in names {
         if !all.iter().any(|e| e.name == name) {
             let known: Vec<&str> = all.iter().map(|e| e.name).collect();
-            let hint = crate::nearest(name, known.iter().copied()).map_or_else(String::new, |n| format!("; is it `{n}`?"));
+            let hint =
+                crate::nearest(name, known.iter().copied()).map_or_else(String::new, |n| format!("; is it `{n}`?"));
             bail!("no experiment is called `{name}`{hint} There are: {}", known.join(", "));
         }
     }
@@ -173,7 +174,9 @@ fn view(panel: &Panel, size: Size) -> Image {
 
 /// All that was measured in time, as JSON.
 fn times(results: &[Result]) -> anyhow::Result<String> {
-    let tables = results.iter().flat_map(|r| r.outcome.tables.iter().filter(|t| t.measured).map(move |t| (format!("{}_{}", r.name, t.name), t)));
+    let tables = results.iter().flat_map(|r| {
+        r.outcome.tables.iter().filter(|t| t.measured).map(move |t| (format!("{}_{}", r.name, t.name), t))
+    });
     let cell = |c: &sutura_paper::Cell| match c {
         sutura_paper::Cell::Word(w) => serde_json::json!(w),
         sutura_paper::Cell::Number(v) => serde_json::json!(v),
@@ -192,7 +195,12 @@ fn html(markdown: &str, out: &Path) -> String {
     let inline = |event: Event<'_>| match event {
         Event::Start(Tag::Image { link_type, dest_url, title, id }) => {
             let data = data_url(&out.join(&*dest_url)).unwrap_or_else(|| dest_url.into_string());
-            Event::Start(Tag::Image { link_type, dest_url: CowStr::from(data), title: title.into_static(), id: id.into_static() })
+            Event::Start(Tag::Image {
+                link_type,
+                dest_url: CowStr::from(data),
+                title: title.into_static(),
+                id: id.into_static(),
+            })
         }
         other => other.into_static(),
     };

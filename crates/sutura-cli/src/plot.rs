@@ -1,5 +1,5 @@
-//! Curves over time as SVG, the same turned into PNG, and captions on pictures. Text is set in `DejaVu Sans`, which is part of the
-//! program, so that no font need be installed.
+//! Curves over time as SVG, the same turned into PNG, and captions on pictures. Text is set in `DejaVu Sans`, which is
+//! part of the program, so that no font need be installed.
 
 use crate::output::put;
 use crate::still::{Image, Size};
@@ -99,7 +99,9 @@ impl Figure {
         let shown = || self.lines.iter().flat_map(|l| l.points.iter().copied()).filter(|p| self.can_show(p));
         let largest = shown().fold(0.0, |a: f64, p| a.max(p.1.abs()));
         let (factor, unit) = si_prefix(largest, &self.y.1);
-        let range = |pick: fn(&(f64, f64)) -> f64| shown().map(|p| pick(&p)).fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(v), a.1.max(v)));
+        let range = |pick: fn(&(f64, f64)) -> f64| {
+            shown().map(|p| pick(&p)).fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(v), a.1.max(v)))
+        };
         let (x, y) = (range(|p| p.0), range(|p| p.1));
         let x = match x.1 > x.0 {
             true if self.log_x => (x.0 / 1.1, x.1 * 1.1),
@@ -165,13 +167,15 @@ impl Frame<'_> {
             .build_cartesian_2d(across, y)?;
         let (left, top) = chart.plotting_area().get_base_pixel();
         let (width, height) = chart.plotting_area().dim_in_pixel();
-        let column = |v: f64| left + (f64::from(width) * figure.share(v, x)).clamp(0.0, f64::from(width)).round() as i32;
+        let column =
+            |v: f64| left + (f64::from(width) * figure.share(v, x)).clamp(0.0, f64::from(width)).round() as i32;
         let spans = || figure.spans.iter().map(|(name, from, to)| (name, column(*from), column(*to)));
 
         for (_, a, b) in spans().skip(1).step_by(2) {
             area.draw(&Rectangle::new([(a, top), (b, top + height as i32)], BAND.filled()))?;
         }
-        let named = |(name, unit): (&str, &str)| if unit.is_empty() { name.to_string() } else { format!("{name} [{unit}]") };
+        let named =
+            |(name, unit): (&str, &str)| if unit.is_empty() { name.to_string() } else { format!("{name} [{unit}]") };
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -202,18 +206,27 @@ impl Frame<'_> {
             color += usize::from(i > 0 && (!line.dots || figure.lines[i - 1].dots));
             let [r, g, b] = THREAD_COLORS[color % THREAD_COLORS.len()];
             if line.dots {
-                let dots =
-                    line.points.iter().filter(|p| figure.can_show(p)).map(|(x, y)| Circle::new((*x, y * factor), 5 * FINE / 2, RGBColor(r, g, b).filled()));
+                let dots = line
+                    .points
+                    .iter()
+                    .filter(|p| figure.can_show(p))
+                    .map(|(x, y)| Circle::new((*x, y * factor), 5 * FINE / 2, RGBColor(r, g, b).filled()));
                 let drawn = chart.draw_series(dots)?;
-                drawn.label(line.name.clone()).legend(move |(lx, ly)| Circle::new((lx + px(8), ly), 5 * FINE / 2, RGBColor(r, g, b).filled()));
+                drawn
+                    .label(line.name.clone())
+                    .legend(move |(lx, ly)| Circle::new((lx + px(8), ly), 5 * FINE / 2, RGBColor(r, g, b).filled()));
                 continue;
             }
             let style = RGBColor(r, g, b).stroke_width(3 * FINE / 2);
             for (k, piece) in line.points.split(|p| !figure.can_show(p)).filter(|p| !p.is_empty()).enumerate() {
-                let points = thin(piece, |p| figure.share(p.0, x), SIZE.width as usize).into_iter().map(|(x, y)| (x, y * factor));
+                let points = thin(piece, |p| figure.share(p.0, x), SIZE.width as usize)
+                    .into_iter()
+                    .map(|(x, y)| (x, y * factor));
                 let drawn = chart.draw_series(LineSeries::new(points, style))?;
                 if k == 0 {
-                    drawn.label(line.name.clone()).legend(move |(lx, ly)| PathElement::new([(lx, ly), (lx + px(16), ly)], style));
+                    drawn
+                        .label(line.name.clone())
+                        .legend(move |(lx, ly)| PathElement::new([(lx, ly), (lx + px(16), ly)], style));
                 }
             }
         }
@@ -237,20 +250,39 @@ impl Frame<'_> {
         use SeriesLabelPosition::{LowerLeft, LowerRight, MiddleLeft, MiddleRight, UpperLeft, UpperRight};
         let figure = self.figure;
         let scale = |v: f64| if figure.log { v.max(f64::MIN_POSITIVE).ln() } else { v };
-        let points: Vec<(f64, f64)> =
-            figure.lines.iter().flat_map(|l| l.points.iter().copied()).filter(|p| figure.can_show(p)).map(|p| (p.0, scale(p.1))).collect();
+        let points: Vec<(f64, f64)> = figure
+            .lines
+            .iter()
+            .flat_map(|l| l.points.iter().copied())
+            .filter(|p| figure.can_show(p))
+            .map(|p| (p.0, scale(p.1)))
+            .collect();
         let (low, high) = points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, p| (a.0.min(p.1), a.1.max(p.1)));
         let share = |p: &(f64, f64)| (figure.share(p.0, self.x), (p.1 - low) / (high - low).max(f64::MIN_POSITIVE));
         let hidden = |right: bool, from: f64, to: f64| {
-            points.iter().map(share).filter(|(u, v)| (if right { *u > 0.75 } else { *u < 0.25 }) && (from..to).contains(v)).count()
+            points
+                .iter()
+                .map(share)
+                .filter(|(u, v)| (if right { *u > 0.75 } else { *u < 0.25 }) && (from..to).contains(v))
+                .count()
         };
-        let places = [(UpperRight, true, 0.6, 1.1), (UpperLeft, false, 0.6, 1.1), (LowerRight, true, -0.1, 0.4), (LowerLeft, false, -0.1, 0.4)];
+        let places = [
+            (UpperRight, true, 0.6, 1.1),
+            (UpperLeft, false, 0.6, 1.1),
+            (LowerRight, true, -0.1, 0.4),
+            (LowerLeft, false, -0.1, 0.4),
+        ];
         let between = [(MiddleRight, true, 0.3, 0.7), (MiddleLeft, false, 0.3, 0.7)];
-        places.into_iter().chain(between).min_by_key(|(_, right, from, to)| hidden(*right, *from, *to)).map_or(UpperRight, |p| p.0)
+        places
+            .into_iter()
+            .chain(between)
+            .min_by_key(|(_, right, from, to)| hidden(*right, *from, *to))
+            .map_or(UpperRight, |p| p.0)
     }
 }
 
-/// At most four points (first, least, greatest, last) for each of `columns` columns, by their share of the width: what the eye sees of the curve, in a small file.
+/// At most four points (first, least, greatest, last) for each of `columns` columns, by their share of the width: what
+/// the eye sees of the curve, in a small file.
 fn thin(points: &[(f64, f64)], across: impl Fn(&(f64, f64)) -> f64, columns: usize) -> Vec<(f64, f64)> {
     if points.len() <= 4 * columns {
         return points.to_vec();
@@ -259,7 +291,8 @@ fn thin(points: &[(f64, f64)], across: impl Fn(&(f64, f64)) -> f64, columns: usi
     let mut out = Vec::with_capacity(4 * columns);
     for piece in points.chunk_by(|a, b| column(a) == column(b)) {
         let by = |a: &usize, b: &usize| piece[*a].1.total_cmp(&piece[*b].1);
-        let mut keep = [0, (0..piece.len()).min_by(by).unwrap_or(0), (0..piece.len()).max_by(by).unwrap_or(0), piece.len() - 1];
+        let mut keep =
+            [0, (0..piece.len()).min_by(by).unwrap_or(0), (0..piece.len()).max_by(by).unwrap_or(0), piece.len() - 1];
         keep.sort_unstable();
         let mut last = None;
         for k in keep {
@@ -296,8 +329,8 @@ pub fn number(v: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_string() } else { text }
 }
 
-/// Writes `text` in the lower left corner of a picture and a scale bar of a round length in the lower right one; `width` is that of
-/// the picture at the point looked at \[m\].
+/// Writes `text` in the lower left corner of a picture and a scale bar of a round length in the lower right one;
+/// `width` is that of the picture at the point looked at \[m\].
 pub fn caption(image: &mut Image, text: &str, width: f64) -> anyhow::Result<()> {
     let (columns, rows) = (f64::from(image.size.width), f64::from(image.size.height));
     let unit = rows / 100.0;
@@ -370,7 +403,8 @@ mod tests {
 
     #[test]
     fn thinning_keeps_ends_and_extremes() {
-        let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), if i == 54_321 { 9.0 } else { f64::from(i % 7) })).collect();
+        let points: Vec<(f64, f64)> =
+            (0..100_000).map(|i| (f64::from(i), if i == 54_321 { 9.0 } else { f64::from(i % 7) })).collect();
         let thinned = thin(&points, |p| p.0 / 99_999.0, 500);
         assert!(thinned.len() <= 4 * 501);
         assert_eq!((thinned[0], thinned[thinned.len() - 1]), (points[0], points[99_999]));
@@ -379,7 +413,10 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_prefixes_suit() {
-        assert_eq!([number(0.1 + 0.2), number(1200.0), number(1e-7), number(-2.5), number(0.0)], ["0.3", "1200", "1.00e-7", "-2.5", "0"]);
+        assert_eq!(
+            [number(0.1 + 0.2), number(1200.0), number(1e-7), number(-2.5), number(0.0)],
+            ["0.3", "1200", "1.00e-7", "-2.5", "0"]
+        );
         assert_eq!(si_prefix(0.02, "N"), (1e3, "mN".into()));
         assert_eq!(si_prefix(2.0, "N"), (1.0, "N".into()));
         assert_eq!(si_prefix(1e-5, ""), (1.0, String::new()));

@@ -28,7 +28,8 @@ fn as_json() -> Value {
     let materials: Vec<Value> = materials()
         .iter()
         .map(|m| {
-            let figures: serde_json::Map<String, Value> = m.figures().iter().map(|(key, f)| ((*key).to_string(), figure(f))).collect();
+            let figures: serde_json::Map<String, Value> =
+                m.figures().iter().map(|(key, f)| ((*key).to_string(), figure(f))).collect();
             json!({ "name": m.name, "title": m.title, "figures": figures })
         })
         .collect();
@@ -53,10 +54,20 @@ impl Sources {
 
 fn as_tables() -> String {
     let mut sources = Sources::default();
-    let mut size_table =
-        table(&["USP size", "metric", "diameter [mm]", "allowed [mm]", "knot pull, absorbable [N]", "knot pull, nonabsorbable [N]"], &[1, 2, 3, 4, 5]);
+    let mut size_table = table(
+        &[
+            "USP size",
+            "metric",
+            "diameter [mm]",
+            "allowed [mm]",
+            "knot pull, absorbable [N]",
+            "knot pull, nonabsorbable [N]",
+        ],
+        &[1, 2, 3, 4, 5],
+    );
     for s in sizes() {
-        let pull = |f: &Option<Figure>, sources: &mut Sources| f.as_ref().map_or_else(|| "-".into(), |f| sources.cite(f, 1.0));
+        let pull =
+            |f: &Option<Figure>, sources: &mut Sources| f.as_ref().map_or_else(|| "-".into(), |f| sources.cite(f, 1.0));
         let (low, high) = s.diameter_range;
         size_table.add_row([
             s.name.to_string(),
@@ -67,8 +78,19 @@ fn as_tables() -> String {
             pull(&s.knot_pull_nonabsorbable, &mut sources),
         ]);
     }
-    let mut material_table =
-        table(&["material", "what it is", "E [GPa]", "Poisson's ratio", "density [kg/m³]", "bend scale", "bend damping [ms]", "friction"], &[2, 3, 4, 5, 6, 7]);
+    let mut material_table = table(
+        &[
+            "material",
+            "what it is",
+            "E [GPa]",
+            "Poisson's ratio",
+            "density [kg/m³]",
+            "bend scale",
+            "bend damping [ms]",
+            "friction",
+        ],
+        &[2, 3, 4, 5, 6, 7],
+    );
     for m in materials() {
         material_table.add_row([
             m.name.to_string(),

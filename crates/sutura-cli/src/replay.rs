@@ -36,9 +36,14 @@ pub fn replay(args: &Replay) -> anyhow::Result<bool> {
     }
     match differs {
         None if args.quiet => {}
-        None => say(&format!("{steps} steps, {time:.4} s: the same state after every step, the last {:016x}", world.state_hash()))?,
+        None => say(&format!(
+            "{steps} steps, {time:.4} s: the same state after every step, the last {:016x}",
+            world.state_hash()
+        ))?,
         Some((step, recorded, found)) => {
-            let mut out = format!("differs after step {step} first: state {recorded:016x} was recorded, {found:016x} was found\n");
+            let mut out = format!(
+                "differs after step {step} first: state {recorded:016x} was recorded, {found:016x} was found\n"
+            );
             before(&recording, step, &mut out);
             say(&out)?;
         }
@@ -88,7 +93,8 @@ fn line(input: &Input) -> String {
     }
 }
 
-/// Every number of threads and shapes, and the contacts that carry force, one a line with its bits, so that two states can be compared.
+/// Every number of threads and shapes, and the contacts that carry force, one a line with its bits, so that two states
+/// can be compared.
 fn numbers(world: &World) -> String {
     let mut out = String::from("what,part,component,value,bits\n");
     let mut put = |what: &str, part: usize, values: &[f64]| {
@@ -114,7 +120,12 @@ fn numbers(world: &World) -> String {
         put(&format!("shape {} orientation", shape.slot), 0, &shape.pose.orientation.to_array());
     }
     for (i, contact) in world.contacts().enumerate() {
-        put(&format!("contact of thread {} element {} with {:?}", contact.a.0, contact.a.1, contact.b).replace(',', ";"), i, &contact.force.to_array());
+        put(
+            &format!("contact of thread {} element {} with {:?}", contact.a.0, contact.a.1, contact.b)
+                .replace(',', ";"),
+            i,
+            &contact.force.to_array(),
+        );
     }
     out
 }

@@ -26,11 +26,13 @@ pub fn run(args: &Run) -> anyhow::Result<bool> {
     let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(scene.name()));
     let runner = if args.record { Runner::recording(scene.clone())? } else { Runner::new(scene.clone())? };
     let saves: Vec<String> = scene.saves().map(file_name).collect();
-    // Before the work, so that a folder that cannot be written is found at once, and an earlier run cannot pass for this one.
+    // Before the work, so that a folder that cannot be written is found at once, and an earlier run cannot pass for
+    // this one.
     let mut results = if args.dry { None } else { Some(Folder::open(&folder, scene.start(), &saves)?) };
     let outcome = simulate(runner, args.quiet);
     if let Some(results) = &mut results {
-        write(&outcome, &scene, results, args).with_context(|| format!("the results in {} are not complete, and there is no report", folder.display()))?;
+        write(&outcome, &scene, results, args)
+            .with_context(|| format!("the results in {} are not complete, and there is no report", folder.display()))?;
     }
     if !args.quiet {
         say(&summary(&outcome.report))?;
@@ -125,7 +127,8 @@ fn file_name(name: &str) -> String {
 
 /// The plots of a run with their file names: from the series `frame` the numbers of every frame, and each probe.
 fn figures(outcome: &Outcome) -> Vec<(String, Figure)> {
-    let spans: Vec<(String, f64, f64)> = outcome.report.phases.iter().map(|p| (p.name.clone(), p.start_s, p.end_s)).collect();
+    let spans: Vec<(String, f64, f64)> =
+        outcome.report.phases.iter().map(|p| (p.name.clone(), p.start_s, p.end_s)).collect();
     let mut all: Vec<(String, Figure)> = Vec::new();
     for series in &outcome.series {
         // Columns of one unit share a picture; those of a frame are grouped by what they mean.
@@ -144,7 +147,13 @@ fn figures(outcome: &Outcome) -> Vec<(String, Figure)> {
 const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
     ("tension", "Largest tension", "tension", false, &["max_tension"]),
     ("elongation", "Largest elongation of an element", "|elongation|", true, &["max_elongation"]),
-    ("clearance", "Closest gap: (distance - radii) / thread diameter", "clearance", false, &["thread_clearance", "shape_clearance"]),
+    (
+        "clearance",
+        "Closest gap: (distance - radii) / thread diameter",
+        "clearance",
+        false,
+        &["thread_clearance", "shape_clearance"],
+    ),
     ("energy", "Mechanical energy", "energy", false, &["energy", "kinetic", "stretch", "bend", "twist", "gravity"]),
     ("ms_per_frame", "Solver time of a frame", "time", true, &["ms"]),
     ("work", "Work of the solver in a frame", "number", false, &["substeps", "rejected", "newton", "contacts"]),
@@ -153,7 +162,11 @@ const FRAME_PLOTS: [(&str, &str, &str, bool, &[&str]); 6] = [
 fn grouped(series: &Series) -> Vec<(String, Figure)> {
     let Some((x_name, x_unit)) = series.columns.first() else { return Vec::new() };
     let x: Vec<f64> = series.rows.iter().map(|r| r[0]).collect();
-    let line = |c: usize, name: &str| Line { name: name.into(), points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect(), dots: false };
+    let line = |c: usize, name: &str| Line {
+        name: name.into(),
+        points: x.iter().copied().zip(series.rows.iter().map(|r| r[c])).collect(),
+        dots: false,
+    };
     let figure = |title: &str, y: (&str, &str), log: bool, lines: Vec<Line>| Figure {
         title: title.into(),
         x: (x_name.clone(), x_unit.clone()),
@@ -165,7 +178,8 @@ fn grouped(series: &Series) -> Vec<(String, Figure)> {
     let mut out = Vec::new();
     if series.name == "frame" {
         for (file, title, y_name, log, names) in FRAME_PLOTS {
-            let columns: Vec<usize> = names.iter().filter_map(|name| series.columns.iter().position(|c| c.0 == **name)).collect();
+            let columns: Vec<usize> =
+                names.iter().filter_map(|name| series.columns.iter().position(|c| c.0 == **name)).collect();
             let Some(&first) = columns.first() else { continue };
             let lines = columns.iter().map(|&c| line(c, &series.columns[c].0.replace('_', " "))).collect();
             out.push((file.to_string(), figure(title, (y_name, &series.columns[first].1), log, lines)));
@@ -192,7 +206,12 @@ fn grouped(series: &Series) -> Vec<(String, Figure)> {
 /// What a recorded frame shows.
 fn subject(header: &Header, frame: &Frame) -> Subject {
     let point = |p: &[f32; 3]| DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
-    let tubes = header.threads.iter().zip(&frame.positions).map(|(t, x)| Tube { points: x.iter().map(point).collect(), radius: t.radius }).collect();
+    let tubes = header
+        .threads
+        .iter()
+        .zip(&frame.positions)
+        .map(|(t, x)| Tube { points: x.iter().map(point).collect(), radius: t.radius })
+        .collect();
     let solids = header.shapes.iter().zip(&frame.shapes).map(|(shape, (x, q))| {
         let orientation = DQuat::from_array(q.map(f64::from)).normalize();
         Solid { geometry: Geometry::from(&shape.outline), pose: Pose::new(point(x), orientation) }
@@ -213,13 +232,15 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run
     };
     let size = Size { width: args.picture_size.0, height: args.picture_size.1 };
     let camera = scene.camera();
-    let up = camera.map_or_else(|| (-DVec3::from(outcome.report.solver.gravity)).try_normalize().unwrap_or(DVec3::Z), |c| c.up);
+    let up = camera
+        .map_or_else(|| (-DVec3::from(outcome.report.solver.gravity)).try_normalize().unwrap_or(DVec3::Z), |c| c.up);
     // One direction for all pictures of a run, from which the last one shows its knot well.
     let at_end = subject(&trajectory.header, last);
     let chosen = args.look.map(DVec3::from).or(camera.map(|c| -c.from));
     let direction = chosen.unwrap_or_else(|| {
         let near = still::knot_region(&at_end.tubes);
-        let seen = if near.is_empty() { at_end.tubes.iter().flat_map(|t| t.points.iter().copied()).collect() } else { near };
+        let seen =
+            if near.is_empty() { at_end.tubes.iter().flat_map(|t| t.points.iter().copied()).collect() } else { near };
         still::best_direction(&at_end, &seen, up)
     });
 
@@ -256,24 +277,34 @@ fn summary(r: &Report) -> String {
     let mut run = table(&["run", ""], &[]);
     let gap = |g: Option<f64>| g.map_or_else(|| "nothing came near".into(), |g| format!("{g:.4}"));
     let truth = |b: Option<bool>| b.map_or("not audited", |b| if b { "YES" } else { "no" });
-    let missed = if r.not_simulated_s > 0.0 { format!("; {:.3} s passed without", r.not_simulated_s) } else { String::new() };
+    let missed =
+        if r.not_simulated_s > 0.0 { format!("; {:.3} s passed without", r.not_simulated_s) } else { String::new() };
     run.add_row(["simulated".to_string(), format!("{:.3} s in {} frames{missed}", r.simulated_s, r.frames)]);
     run.add_row(["solver".to_string(), format!("{:.3} s CPU", r.cpu_s)]);
-    run.add_row(["real-time factor".to_string(), format!("{:.2}, worst second {:.2}", r.real_time_factor, r.worst_second_real_time_factor)]);
+    run.add_row([
+        "real-time factor".to_string(),
+        format!("{:.2}, worst second {:.2}", r.real_time_factor, r.worst_second_real_time_factor),
+    ]);
     let t = &r.ms_per_frame;
     run.add_row(["ms per frame".to_string(), format!("median {:.3}, p99 {:.3}, most {:.3}", t.median, t.p99, t.max)]);
     let c = &r.min_clearance;
-    run.add_row(["least clearance [diameters]".to_string(), format!("thread-thread {}, thread-shape {}", gap(c.thread_thread), gap(c.thread_shape))]);
+    run.add_row([
+        "least clearance [diameters]".to_string(),
+        format!("thread-thread {}, thread-shape {}", gap(c.thread_thread), gap(c.thread_shape)),
+    ]);
     run.add_row(["passes through".to_string(), truth(r.passes_through).to_string()]);
     run.add_row(["state hash".to_string(), r.state_hash.clone()]);
     out.push_str(&format!("{run}\n\n"));
 
-    let mut threads = table(&["thread", "elements", "length [mm]", "radius [mm]", "max elongation", "max tension [N]", "knot"], &[1, 2, 3, 4, 5]);
+    let mut threads = table(
+        &["thread", "elements", "length [mm]", "radius [mm]", "max elongation", "max tension [N]", "knot"],
+        &[1, 2, 3, 4, 5],
+    );
     for t in &r.threads {
-        let knot = t
-            .knot
-            .as_ref()
-            .map_or_else(|| "-".into(), |k| format!("{}{} (det {}, sig {}, {}/{})", k.knot, form(k), k.determinant, k.signature, k.agreed, k.tried));
+        let knot = t.knot.as_ref().map_or_else(
+            || "-".into(),
+            |k| format!("{}{} (det {}, sig {}, {}/{})", k.knot, form(k), k.determinant, k.signature, k.agreed, k.tried),
+        );
         threads.add_row([
             t.name.clone(),
             t.elements.to_string(),
@@ -290,7 +321,13 @@ fn summary(r: &Report) -> String {
     let mut phases = table(&["phase", "from [s]", "to [s]", "ended by", "knots"], &[1, 2]);
     for p in &r.phases {
         let knots: Vec<String> = p.knots.iter().map(|(thread, k)| format!("{thread}: {}{}", k.knot, form(k))).collect();
-        phases.add_row([p.name.clone(), format!("{:.3}", p.start_s), format!("{:.3}", p.end_s), p.ended_by.clone(), knots.join(", ")]);
+        phases.add_row([
+            p.name.clone(),
+            format!("{:.3}", p.start_s),
+            format!("{:.3}", p.end_s),
+            p.ended_by.clone(),
+            knots.join(", "),
+        ]);
     }
     if !r.phases.is_empty() {
         out.push_str(&format!("{phases}\n\n"));
@@ -305,7 +342,13 @@ fn summary(r: &Report) -> String {
     let mut checks = table(&["check", "found", "unit", "wanted", "result"], &[1]);
     for c in &r.checks {
         let found = c.value.as_ref().map_or_else(|| "never reached".into(), ToString::to_string);
-        checks.add_row([c.name.clone(), found, c.unit.clone(), c.wanted.clone(), if c.passed { "passed" } else { "FAILED" }.into()]);
+        checks.add_row([
+            c.name.clone(),
+            found,
+            c.unit.clone(),
+            c.wanted.clone(),
+            if c.passed { "passed" } else { "FAILED" }.into(),
+        ]);
     }
     if !r.checks.is_empty() {
         out.push_str(&format!("{checks}\n\n"));
@@ -332,7 +375,10 @@ fn summary(r: &Report) -> String {
             let last = r.phases.last().map_or_else(String::new, |p| format!(" in phase `{}`: {}", p.name, p.ended_by));
             format!("FAILED{last}.")
         }
-        (false, n) => format!("FAILED: {}.", [vec![format!("{n} of {} checks", r.checks.len())], r.failures.clone()].concat().join("; ")),
+        (false, n) => format!(
+            "FAILED: {}.",
+            [vec![format!("{n} of {} checks", r.checks.len())], r.failures.clone()].concat().join("; ")
+        ),
     };
     out.push_str(&verdict);
     out.push('\n');
@@ -362,8 +408,11 @@ mod tests {
 
     #[test]
     fn columns_of_one_unit_share_a_picture() {
-        let columns = [("time", "s"), ("x", "m"), ("y", "m"), ("force", "N")].map(|(n, u)| (n.to_string(), u.to_string())).to_vec();
-        let series = Series { name: "end".into(), columns, rows: vec![vec![0.0, 1.0, 2.0, 3.0], vec![1.0, 2.0, 3.0, 4.0]] };
+        let columns = [("time", "s"), ("x", "m"), ("y", "m"), ("force", "N")]
+            .map(|(n, u)| (n.to_string(), u.to_string()))
+            .to_vec();
+        let series =
+            Series { name: "end".into(), columns, rows: vec![vec![0.0, 1.0, 2.0, 3.0], vec![1.0, 2.0, 3.0, 4.0]] };
         let names: Vec<(String, usize)> = grouped(&series).into_iter().map(|(n, f)| (n, f.lines.len())).collect();
         assert_eq!(names, [("probe-end-x".to_string(), 2), ("probe-end-force".to_string(), 1)]);
     }

@@ -1,7 +1,8 @@
-//! Still pictures of threads and shapes: rays cast at capsules, cylinders, boxes and triangles, with soft shadow and ambient
-//! occlusion, so that over and under at a crossing can be told. A picture is a function of its input alone.
+//! Still pictures of threads and shapes: rays cast at capsules, cylinders, boxes and triangles, with soft shadow and
+//! ambient occlusion, so that over and under at a crossing can be told. A picture is a function of its input alone.
 //!
-//! The thread is drawn as a tube about a smooth curve near its polyline, not as the polyline's capsules (`smooth` in `stage`).
+//! The thread is drawn as a tube about a smooth curve near its polyline, not as the polyline's capsules (`smooth` in
+//! `stage`).
 
 mod camera;
 mod cast;
@@ -79,7 +80,8 @@ impl Image {
     }
 }
 
-/// Cells of the 4 x 4 grid of a pixel in the order in which they are sampled: first four that share no row and no column.
+/// Cells of the 4 x 4 grid of a pixel in the order in which they are sampled: first four that share no row and no
+/// column.
 const SAMPLE_ORDER: [u32; 16] = [1, 7, 8, 14, 2, 4, 11, 13, 0, 6, 9, 15, 3, 5, 10, 12];
 
 /// Samples of a pixel that looks like its neighbors.
@@ -140,7 +142,9 @@ impl Painter<'_> {
     /// Sum over some of the samples of a pixel.
     fn sum(&self, x: usize, y: usize, samples: core::ops::Range<usize>) -> Color {
         let mut dice = Dice::new(samples.start);
-        let place = |at: usize, cell: u32, count: u32| 2.0 * (at as f64 + (f64::from(cell) + 0.5) / 4.0) / f64::from(count) - 1.0;
+        let place = |at: usize, cell: u32, count: u32| {
+            2.0 * (at as f64 + (f64::from(cell) + 0.5) / 4.0) / f64::from(count) - 1.0
+        };
         let one = |k: u32| {
             let (u, v) = (place(x, k % 4, self.size.width), -place(y, k / 4, self.size.height));
             look_along(&self.stage, self.camera, &self.camera.ray(u, v), v, &mut dice)
@@ -162,12 +166,21 @@ mod tests {
 
     /// Two threads that cross at the origin, the first along x at height `z` over the second along y.
     fn crossing(z: f64) -> Subject {
-        let tube = |along: DVec3, at: DVec3| Tube { points: (-4..=4).map(|i| along * (f64::from(i) * 1e-3) + at).collect(), radius: 3e-4 };
+        let tube = |along: DVec3, at: DVec3| Tube {
+            points: (-4..=4).map(|i| along * (f64::from(i) * 1e-3) + at).collect(),
+            radius: 3e-4,
+        };
         Subject { tubes: vec![tube(DVec3::X, DVec3::Z * z), tube(DVec3::Y, DVec3::ZERO)], solids: Vec::new() }
     }
 
     fn from_above(subject: &Subject, orthographic: bool) -> Image {
-        let look = Look { direction: Some(-DVec3::Z), up: Some(DVec3::Y), at: Some(DVec3::ZERO), width: Some(4e-3), orthographic };
+        let look = Look {
+            direction: Some(-DVec3::Z),
+            up: Some(DVec3::Y),
+            at: Some(DVec3::ZERO),
+            width: Some(4e-3),
+            orthographic,
+        };
         render(subject, &Camera::fit(&look, &[], 1e-4, SIZE), SIZE)
     }
 
@@ -191,7 +204,10 @@ mod tests {
 
     #[test]
     fn a_picture_has_the_same_bytes_each_time() {
-        assert!(from_above(&crossing(7e-4), false).rgb == from_above(&crossing(7e-4), false).rgb, "whatever thread draws which row");
+        assert!(
+            from_above(&crossing(7e-4), false).rgb == from_above(&crossing(7e-4), false).rgb,
+            "whatever thread draws which row"
+        );
     }
 
     #[test]

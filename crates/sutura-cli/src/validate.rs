@@ -49,7 +49,9 @@ fn chosen(args: &Validate) -> anyhow::Result<Vec<Section>> {
     }
     for section in &mut sections {
         let number = section.number;
-        let wanted = |name: &str| args.cases.iter().any(|w| w.parse::<u32>().map_or_else(|_| name.contains(w.as_str()), |n| n == number));
+        let wanted = |name: &str| {
+            args.cases.iter().any(|w| w.parse::<u32>().map_or_else(|_| name.contains(w.as_str()), |n| n == number))
+        };
         section.studies.retain(|c| (args.cases.is_empty() || wanted(&c.name)) && (!args.quick || c.quick));
     }
     sections.retain(|s| !s.studies.is_empty());
@@ -60,7 +62,13 @@ fn list(sections: &[Section]) -> String {
     let mut t = table(&["section", "case", "scene", "runs", "quantities"], &[0, 3, 4]);
     for section in sections {
         for c in &section.studies {
-            t.add_row([section.number.to_string(), c.name.clone(), c.scene.into(), c.levels.len().to_string(), c.quantities.len().to_string()]);
+            t.add_row([
+                section.number.to_string(),
+                c.name.clone(),
+                c.scene.into(),
+                c.levels.len().to_string(),
+                c.quantities.len().to_string(),
+            ]);
         }
     }
     t.to_string()
@@ -107,7 +115,11 @@ fn figure(plot: &Plot) -> Figure {
         title: plot.title.clone(),
         x: own(plot.x),
         y: own(plot.y),
-        lines: plot.curves.iter().map(|c| Line { name: c.name.clone(), points: c.points.clone(), dots: c.dots }).collect(),
+        lines: plot
+            .curves
+            .iter()
+            .map(|c| Line { name: c.name.clone(), points: c.points.clone(), dots: c.dots })
+            .collect(),
         ..Figure::default()
     }
 }
@@ -118,7 +130,12 @@ fn failures(results: &[SectionResult]) -> String {
     for section in results {
         for (study, row) in section.rows().filter(|(_, row)| !row.passed) {
             let last = |values: &[f64]| values.last().map_or_else(|| "-".into(), |v| crate::plot::number(*v));
-            let error = row.errors.last().copied().flatten().map_or_else(String::new, |e| format!(", error {:.3} %", 100.0 * e));
+            let error = row
+                .errors
+                .last()
+                .copied()
+                .flatten()
+                .map_or_else(String::new, |e| format!(", error {:.3} %", 100.0 * e));
             let order = row.order.map_or_else(String::new, |p| format!(", order {p:.2}"));
             let why = row.reason.as_ref().map_or_else(String::new, |r| format!(": {r}"));
             out.push_str(&format!(

@@ -51,7 +51,8 @@ at_least = "LIMIT"
 "#;
 
 fn write_swing(folder: &Path, limit: &str) {
-    std::fs::write(folder.join("swing.toml"), SWING.replace("LIMIT", limit)).expect("a temporary folder can be written");
+    std::fs::write(folder.join("swing.toml"), SWING.replace("LIMIT", limit))
+        .expect("a temporary folder can be written");
 }
 
 fn is_png(path: &Path, width: u32, height: u32) -> bool {
@@ -124,20 +125,41 @@ fn a_run_writes_everything_and_what_it_writes_reads_back() {
         assert!(printed.contains(word), "`{word}` is printed: {printed}");
     }
     let results = folder.path().join("out/swing");
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(results.join("report.json")).unwrap()).unwrap();
-    let keys = ["scene", "solver", "simulated_s", "cpu_s", "real_time_factor", "ms_per_frame", "threads", "min_clearance", "passes_through"];
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(results.join("report.json")).unwrap()).unwrap();
+    let keys = [
+        "scene",
+        "solver",
+        "simulated_s",
+        "cpu_s",
+        "real_time_factor",
+        "ms_per_frame",
+        "threads",
+        "min_clearance",
+        "passes_through",
+    ];
     for key in keys.iter().chain(&["probes", "checks", "incidents", "state_hash"]) {
         assert!(report.get(key).is_some(), "report.json has `{key}`");
     }
     // Frames are a sixtieth of a second, so the run ends within one of its tenth of a second.
     assert!((report["simulated_s"].as_f64().unwrap() - 0.1).abs() < 1.0 / 60.0);
     assert_eq!(report["checks"][0]["passed"], true);
-    for file in ["series/frame.csv", "series/tip.csv", "plots/tension.svg", "plots/elongation.svg", "plots/energy.svg", "plots/ms_per_frame.svg"] {
+    for file in [
+        "series/frame.csv",
+        "series/tip.csv",
+        "plots/tension.svg",
+        "plots/elongation.svg",
+        "plots/energy.svg",
+        "plots/ms_per_frame.svg",
+    ] {
         let content = std::fs::read_to_string(results.join(file)).unwrap_or_default();
         assert!(content.len() > 100, "{file} is there and not empty");
     }
     for plot in ["tension", "elongation", "energy", "ms_per_frame", "probe-tip"] {
-        assert!(is_png(&results.join(format!("plots/{plot}.png")), 1720, 880), "{plot}.png is a picture of the size drawn");
+        assert!(
+            is_png(&results.join(format!("plots/{plot}.png")), 1720, 880),
+            "{plot}.png is a picture of the size drawn"
+        );
     }
     assert!(is_png(&results.join("stills/000.0500s.png"), 96, 72), "the still asked for is there");
     let trajectory = sutura_scene::Trajectory::read_from(&results.join("trajectory.sutura")).unwrap();
@@ -173,9 +195,13 @@ fn a_spilled_knot_is_told_from_a_flat_one_where_the_diameter_is_known() {
         let out = sutura(folder.path(), &["knot", &path, "--diameter", "0.225", "--json", "--expect", "square"]);
         let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
         assert_eq!(out.status.code(), Some(0));
-        assert_eq!((answer["form"]["verdict"].as_str(), answer["form"]["straight"].as_str()), (Some(verdict), straight));
+        assert_eq!(
+            (answer["form"]["verdict"].as_str(), answer["form"]["straight"].as_str()),
+            (Some(verdict), straight)
+        );
         assert!(text(&sutura(folder.path(), &["knot", &path, "--diameter", "0.225"]).stdout).contains(verdict));
-        let unknown: serde_json::Value = serde_json::from_slice(&sutura(folder.path(), &["knot", &path, "--json"]).stdout).unwrap();
+        let unknown: serde_json::Value =
+            serde_json::from_slice(&sutura(folder.path(), &["knot", &path, "--json"]).stdout).unwrap();
         assert!(unknown["form"].is_null(), "without a diameter nothing touches");
     }
 }
@@ -184,22 +210,34 @@ fn a_spilled_knot_is_told_from_a_flat_one_where_the_diameter_is_known() {
 #[test]
 fn the_strength_of_knots_is_tabled() {
     let folder = tempfile::tempdir().unwrap();
-    let listed = sutura(folder.path(), &["knot-strength", "--throws", "square,2x1", "--mu", "0.1,0.3", "--pretension", "1N,2N", "--list"]);
+    let listed = sutura(
+        folder.path(),
+        &["knot-strength", "--throws", "square,2x1", "--mu", "0.1,0.3", "--pretension", "1N,2N", "--list"],
+    );
     let lines = text(&listed.stdout);
     assert_eq!((listed.status.code(), lines.lines().count()), (Some(0), 8), "{lines}");
     assert!(lines.contains("2x1, drawn with 2 N, mu 0.3"), "{lines}");
     assert!(!folder.path().join("out").exists(), "--list writes nothing");
 
-    let out = sutura(folder.path(), &["knot-strength", "--plastic", "--throws", "granny", "--mu", "0.2,0.3", "--budget", "0.000001"]);
+    let out = sutura(
+        folder.path(),
+        &["knot-strength", "--plastic", "--throws", "granny", "--mu", "0.2,0.3", "--budget", "0.000001"],
+    );
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     assert!(text(&out.stdout).contains("not finished"), "{}", text(&out.stdout));
     let made = folder.path().join("out/knot-strength");
     let read = |name: &str| std::fs::read_to_string(made.join(name)).unwrap();
     let table = read("knot_strength.csv");
     assert_eq!(table.lines().count(), 3, "{table}");
-    assert!(table.lines().skip(1).all(|l| l.starts_with("granny,1,0.") && l.contains("over 0.000001 s of CPU time")), "{table}");
+    assert!(
+        table.lines().skip(1).all(|l| l.starts_with("granny,1,0.") && l.contains("over 0.000001 s of CPU time")),
+        "{table}"
+    );
     let report = read("knot_strength.md");
-    assert!(report.contains("| granny | 1 | not finished | not finished |") && report.contains("knot-pull strength 9.41 N"), "{report}");
+    assert!(
+        report.contains("| granny | 1 | not finished | not finished |") && report.contains("knot-pull strength 9.41 N"),
+        "{report}"
+    );
     assert_eq!(read("knot_strength_pulls.csv").lines().count(), 1, "nothing was pulled");
 }
 
@@ -223,7 +261,11 @@ fn knots_of_the_reference_polylines() {
             let out = sutura(folder.path(), &args);
             let answer: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
             assert_eq!((answer["knot"].as_str(), out.status.code()), (Some(name), Some(0)), "{file} {join:?}");
-            assert_eq!((answer["determinant"].as_u64(), answer["signature"].as_i64()), (Some(determinant), Some(signature)), "{file} {join:?}");
+            assert_eq!(
+                (answer["determinant"].as_u64(), answer["signature"].as_i64()),
+                (Some(determinant), Some(signature)),
+                "{file} {join:?}"
+            );
         }
     }
     let out = sutura(folder.path(), &["knot", &polyline("granny_+3+3"), "--expect", "square"]);
@@ -252,12 +294,23 @@ fn a_knot_without_a_name_is_told_from_one_that_is_not_certain() {
     // The torus knot of 13 crossings: no knot of the tables has as many. Its determinant is 13, its signature 12.
     std::fs::write(folder.path().join("points.csv"), torus_knot(2, 13)).unwrap();
     let (code, words) = knot(&["--closed"]);
-    assert!(code == Some(3) && words.starts_with("certain, but no knot that has a name here (unnamed)") && words.contains("determinant 13"), "{words}");
+    assert!(
+        code == Some(3)
+            && words.starts_with("certain, but no knot that has a name here (unnamed)")
+            && words.contains("determinant 13"),
+        "{words}"
+    );
     let (code, json) = knot(&["--closed", "--json"]);
     let answer: serde_json::Value = serde_json::from_str(&json).unwrap();
-    assert_eq!((code, answer["knot"].as_str(), answer["certain"].as_bool(), answer["determinant"].as_u64()), (Some(3), Some("unnamed"), Some(true), Some(13)));
+    assert_eq!(
+        (code, answer["knot"].as_str(), answer["certain"].as_bool(), answer["determinant"].as_u64()),
+        (Some(3), Some("unnamed"), Some(true), Some(13))
+    );
     assert_eq!(answer["signature"].as_i64().map(i64::abs), Some(12));
-    assert_eq!((knot(&["--closed", "--expect", "unnamed"]).0, knot(&["--closed", "--expect", "unknown"]).0), (Some(0), Some(1)));
+    assert_eq!(
+        (knot(&["--closed", "--expect", "unnamed"]).0, knot(&["--closed", "--expect", "unknown"]).0),
+        (Some(0), Some(1))
+    );
     // A trefoil cut where its end lies in a loop: some closures are knots and some are not.
     let trefoil = torus_knot(2, 3);
     let cut: Vec<&str> = trefoil.lines().collect();
@@ -268,7 +321,10 @@ fn a_knot_without_a_name_is_told_from_one_that_is_not_certain() {
     assert!(words.starts_with("not certain (unknown)") && words.contains("Disagreement"), "{words}");
     let answer: serde_json::Value = serde_json::from_str(&knot(&["--seed", seed, "--json"]).1).unwrap();
     assert_eq!((answer["knot"].as_str(), answer["certain"].as_bool()), (Some("unknown"), Some(false)));
-    assert_eq!((knot(&["--seed", seed, "--expect", "unknown"]).0, knot(&["--seed", seed, "--expect", "unnamed"]).0), (Some(0), Some(1)));
+    assert_eq!(
+        (knot(&["--seed", seed, "--expect", "unknown"]).0, knot(&["--seed", seed, "--expect", "unnamed"]).0),
+        (Some(0), Some(1))
+    );
 }
 
 /// What is recognized is under the same keys in the report and in what `sutura knot` prints.
@@ -277,9 +333,13 @@ fn a_knot_has_one_key_everywhere() {
     let folder = tempfile::tempdir().unwrap();
     write_swing(folder.path(), "5 mm");
     let settings = ["--set", "thread.thread.knot=true", "--set", "phase.fall.knot=true"];
-    let out = sutura(folder.path(), &[&["run", "swing.toml", "--quiet", "--no-plots", "--no-stills"], &settings[..]].concat());
+    let out = sutura(
+        folder.path(),
+        &[&["run", "swing.toml", "--quiet", "--no-plots", "--no-stills"], &settings[..]].concat(),
+    );
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
-    let report: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.path().join("out/swing/report.json")).unwrap()).unwrap();
+    let report: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("out/swing/report.json")).unwrap()).unwrap();
     let printed = sutura(folder.path(), &["knot", "out/swing/trajectory.sutura", "--json"]);
     let printed: serde_json::Value = serde_json::from_slice(&printed.stdout).unwrap();
     for found in [&report["threads"][0]["knot"], &report["phases"][0]["knots"][0][1], &printed] {
@@ -302,7 +362,12 @@ fn an_interrupted_run_leaves_no_report_and_keeps_others_out_only_while_it_goes_o
     assert!(report.is_file());
 
     let mut command = Command::new(env!("CARGO_BIN_EXE_sutura"));
-    let mut long = command.args(["run", "swing.toml", "--set", "phase.fall.duration=100000 s"]).args(files).current_dir(folder.path()).spawn().unwrap();
+    let mut long = command
+        .args(["run", "swing.toml", "--set", "phase.fall.duration=100000 s"])
+        .args(files)
+        .current_dir(folder.path())
+        .spawn()
+        .unwrap();
     let begun = std::time::Instant::now();
     while report.exists() && begun.elapsed().as_secs() < 60 {
         std::thread::sleep(std::time::Duration::from_millis(10));
@@ -332,7 +397,10 @@ fn a_full_disk_leaves_no_report_and_no_file_that_is_cut() {
     let limited = format!("trap '' XFSZ; ulimit -f 8; exec '{}' {}", env!("CARGO_BIN_EXE_sutura"), run.join(" "));
     let out = Command::new("sh").args(["-c", &limited]).current_dir(folder.path()).output().unwrap();
     let error = text(&out.stderr);
-    assert!(out.status.code() == Some(2) && error.contains("no report") && error.contains("cannot write results"), "{error}");
+    assert!(
+        out.status.code() == Some(2) && error.contains("no report") && error.contains("cannot write results"),
+        "{error}"
+    );
     let results = folder.path().join("results");
     assert!(!results.join("report.json").exists() && results.join("series/frame.csv").is_file());
     for file in ["plots", "series", "stills"].iter().filter_map(|f| std::fs::read_dir(results.join(f)).ok()).flatten() {
@@ -360,7 +428,12 @@ fn a_folder_with_files_of_somebody_else_is_left_alone() {
     assert!(text(&out.stderr).contains("report.json is not of an earlier run"), "{}", text(&out.stderr));
     assert_eq!(std::fs::read_to_string(folder.path().join("report.json")).unwrap(), "{ \"mine\": true }");
     std::fs::remove_file(folder.path().join("report.json")).unwrap();
-    assert_eq!(sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."]).status.code(), Some(0));
+    assert_eq!(
+        sutura(folder.path(), &["run", "swing.toml", "--quiet", "--no-plots", "--no-stills", "--out", "."])
+            .status
+            .code(),
+        Some(0)
+    );
     assert!(folder.path().join("swing.toml").is_file() && folder.path().join("report.json").is_file());
 }
 
@@ -372,7 +445,10 @@ fn scenes_are_listed_shown_and_copied_but_not_over_a_file() {
         assert!(list.contains(sample.name), "{} is listed", sample.name);
     }
     let sample = &sutura_scene::samples()[0];
-    assert_eq!(text(&sutura(folder.path(), &["scenes", "show", sample.name]).stdout).trim_end(), sample.text.trim_end());
+    assert_eq!(
+        text(&sutura(folder.path(), &["scenes", "show", sample.name]).stdout).trim_end(),
+        sample.text.trim_end()
+    );
     assert_eq!(sutura(folder.path(), &["scenes", "copy", sample.name]).status.code(), Some(0));
     let file = folder.path().join(format!("{}.toml", sample.name));
     assert_eq!(std::fs::read_to_string(&file).unwrap(), sample.text);
@@ -386,7 +462,8 @@ fn presets_say_what_is_unverified() {
     let folder = tempfile::tempdir().unwrap();
     let out = text(&sutura(folder.path(), &["presets"]).stdout);
     assert!(out.contains("3-0") && out.contains("silk") && out.contains("* unverified") && out.contains("Sources"));
-    let json: serde_json::Value = serde_json::from_slice(&sutura(folder.path(), &["presets", "--json"]).stdout).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_slice(&sutura(folder.path(), &["presets", "--json"]).stdout).unwrap();
     let silk = json["materials"].as_array().unwrap().iter().find(|m| m["name"] == "silk").expect("silk is a preset");
     // Naleway 2015 measured the modulus; no one measured the bending scale.
     assert_eq!(silk["figures"]["young_modulus"]["verified"], true);
@@ -396,7 +473,10 @@ fn presets_say_what_is_unverified() {
 #[test]
 fn bench_measures_and_names_the_machine() {
     let folder = tempfile::tempdir().unwrap();
-    let out = sutura(folder.path(), &["bench", "--free", "--elements", "10", "--frames", "5", "--shape", "straight", "--json"]);
+    let out = sutura(
+        folder.path(),
+        &["bench", "--free", "--elements", "10", "--frames", "5", "--shape", "straight", "--json"],
+    );
     assert_eq!(out.status.code(), Some(0), "{}", text(&out.stderr));
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
     assert!(json["machine"]["cores"].as_u64() >= Some(1) && json["machine"]["build"].is_string());
@@ -430,7 +510,8 @@ fn values_of_a_scene_can_be_set() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     write_swing(folder.path(), "1 mm");
     let run = |settings: &[&str]| {
-        let args: Vec<&str> = ["run", "swing.toml", "--dry"].into_iter().chain(settings.iter().flat_map(|s| ["--set", s])).collect();
+        let args: Vec<&str> =
+            ["run", "swing.toml", "--dry"].into_iter().chain(settings.iter().flat_map(|s| ["--set", s])).collect();
         sutura(folder.path(), &args)
     };
     assert_eq!(run(&[]).status.code(), Some(0));
@@ -438,7 +519,11 @@ fn values_of_a_scene_can_be_set() {
     assert_eq!(run(&["solver.gravity=[0, 0, 0]"]).status.code(), Some(1));
     let wrong = run(&["thread.thread.elments=5"]);
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(text(&wrong.stderr).contains("thread.thread.elments = 5") && text(&wrong.stderr).contains("`elements`"), "{}", text(&wrong.stderr));
+    assert!(
+        text(&wrong.stderr).contains("thread.thread.elments = 5") && text(&wrong.stderr).contains("`elements`"),
+        "{}",
+        text(&wrong.stderr)
+    );
 }
 
 #[test]
@@ -462,7 +547,9 @@ fn scenes_and_recordings_are_exported() {
     // A scene that is run knows its velocities as well; a recording its forces.
     said(&["export", "swing.toml", "--format", "vtk", "--out", "live", "--set", "thread.thread.elements=10"]);
     said(&["export", recording, "--format", "vtk"]);
-    let has = |file: &str, field: &str| std::fs::read_to_string(folder.path().join(file)).expect("a file").contains(&format!("\"{field}\""));
+    let has = |file: &str, field: &str| {
+        std::fs::read_to_string(folder.path().join(file)).expect("a file").contains(&format!("\"{field}\""))
+    };
     assert!(has("live/threads_00003.vtp", "tension") && has("out/swing/vtk/threads_00003.vtp", "tension"));
     assert!(has("live/threads_00003.vtp", "velocity") && !has("out/swing/vtk/threads_00003.vtp", "velocity"));
     assert!(folder.path().join("live/threads.pvd").is_file() && !folder.path().join("live/shapes.pvd").exists());
@@ -481,7 +568,8 @@ fn a_recorded_run_replays_to_the_same_state_after_every_step() {
         assert!(sutura(folder.path(), &args).status.success());
         format!("{out}/input.sutura")
     };
-    let (one, same, other) = (run("one", &[]), run("same", &[]), run("other", &["--set", "thread.thread.density=1151 kg/m^3"]));
+    let (one, same, other) =
+        (run("one", &[]), run("same", &[]), run("other", &["--set", "thread.thread.density=1151 kg/m^3"]));
     let said = |args: &[&str]| {
         let output = sutura(folder.path(), &[&["replay"], args].concat());
         (output.status.code(), text(&output.stdout))
@@ -511,7 +599,10 @@ fn a_recorded_run_replays_to_the_same_state_after_every_step() {
     let state = std::fs::read_to_string(folder.path().join("state.csv")).expect("a table");
     assert!(code == Some(0) && state.lines().count() > 21 * 6 && state.contains("thread 0 position,20,2,"), "{state}");
     let (code, list) = said(&[&same, "--list"]);
-    assert!(code == Some(0) && list.lines().filter(|l| l.starts_with("Step(")).count() == 6 && list.contains("InsertGrip"), "{list}");
+    assert!(
+        code == Some(0) && list.lines().filter(|l| l.starts_with("Step(")).count() == 6 && list.contains("InsertGrip"),
+        "{list}"
+    );
 
     std::fs::write(&path, &bytes[..last]).expect("a temporary folder can be written");
     assert_eq!(said(&[&one]).0, Some(2));
@@ -524,7 +615,8 @@ fn without_a_viewer_it_says_how_to_get_one_and_with_one_it_passes_on_what_was_as
     // The program alone in a folder, and nothing in PATH.
     let program = folder.path().join(format!("sutura{}", std::env::consts::EXE_SUFFIX));
     std::fs::copy(env!("CARGO_BIN_EXE_sutura"), &program).unwrap();
-    let run = |args: &[&str]| Command::new(&program).args(args).env("PATH", folder.path().join("empty")).output().unwrap();
+    let run =
+        |args: &[&str]| Command::new(&program).args(args).env("PATH", folder.path().join("empty")).output().unwrap();
     let out = run(&["view", "capstan"]);
     assert_eq!(out.status.code(), Some(2));
     assert!(text(&out.stderr).contains("cargo install --path bevy/sutura-view"));

@@ -1,5 +1,6 @@
-//! Runs scene files and records what they do to their worlds, with the state hash after every step: `record FOLDER SCENE...` writes
-//! `FOLDER/<scene>.input` for each. The whole check runs it in a build for other features of the processor; `sutura replay` reads the files.
+//! Runs scene files and records what they do to their worlds, with the state hash after every step: `record FOLDER
+//! SCENE...` writes `FOLDER/<scene>.input` for each. The whole check runs it in a build for other features of the
+//! processor; `sutura replay` reads the files.
 
 use std::path::Path;
 use sutura_scene::{Runner, Scene};
@@ -16,7 +17,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let outcome = runner.finish();
         let input = outcome.input.ok_or("nothing was recorded")?;
         let report = outcome.report;
-        println!("{} {} {} in {:.1} s CPU", report.state_hash, report.scene, if report.passed { "passed" } else { "FAILED" }, report.cpu_s);
+        println!(
+            "{} {} {} in {:.1} s CPU",
+            report.state_hash,
+            report.scene,
+            if report.passed { "passed" } else { "FAILED" },
+            report.cpu_s
+        );
         std::fs::write(file, input.to_bytes())?;
     }
     Ok(())

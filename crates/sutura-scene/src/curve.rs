@@ -80,7 +80,8 @@ impl Curve {
         self.pieces[i].at(if length > 0.0 { (s - start) / length } else { 0.0 })
     }
 
-    /// `n + 1` points on the curve from its start to its end, neighbors at equal distance. Fails when the curve has no length.
+    /// `n + 1` points on the curve from its start to its end, neighbors at equal distance. Fails when the curve has no
+    /// length.
     pub fn cut(&self, n: usize) -> Option<Vec<DVec3>> {
         let total = self.length();
         if self.pieces.is_empty() || n == 0 || !total.is_finite() || total <= 0.0 {
@@ -90,8 +91,9 @@ impl Curve {
         if let [piece] = self.pieces.as_slice() {
             return Some((0..=n).map(|i| piece.at(i as f64 / n as f64)).collect());
         }
-        // The chord with which n steps end exactly at the end: steps that are too long overshoot. A chord is never longer than its
-        // piece of curve, so total/n is an upper bound; the lower end is where even a straight way would fall short.
+        // The chord with which n steps end exactly at the end: steps that are too long overshoot. A chord is never
+        // longer than its piece of curve, so total/n is an upper bound; the lower end is where even a straight way
+        // would fall short.
         let (mut low, mut high) = (0.25 * total / n as f64, total / n as f64);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
@@ -145,8 +147,8 @@ pub fn helix(start: DVec3, center: DVec3, axis: DVec3, turns: f64, pitch: f64) -
     turn(start, center, axis, turns * TAU, pitch * turns.abs())
 }
 
-/// Points from text: three numbers a line, separated by commas, semicolons or blanks; the first line may be a heading, lines beginning
-/// with `#` are remarks. Numbers are multiplied by `unit`.
+/// Points from text: three numbers a line, separated by commas, semicolons or blanks; the first line may be a heading,
+/// lines beginning with `#` are remarks. Numbers are multiplied by `unit`.
 pub fn read_points(text: &str, unit: f64) -> Result<Vec<DVec3>, String> {
     let mut points = Vec::new();
     for (i, line) in text.lines().enumerate() {
@@ -154,12 +156,23 @@ pub fn read_points(text: &str, unit: f64) -> Result<Vec<DVec3>, String> {
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
-        let numbers: Result<Vec<f64>, _> = line.split([',', ';', ' ', '\t']).filter(|w| !w.is_empty()).map(str::parse::<f64>).collect();
+        let numbers: Result<Vec<f64>, _> =
+            line.split([',', ';', ' ', '\t']).filter(|w| !w.is_empty()).map(str::parse::<f64>).collect();
         match numbers.as_deref() {
-            Ok([x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => points.push(DVec3::new(*x, *y, *z) * unit),
-            Ok(other) if other.len() != 3 => return Err(format!("line {}: {} numbers, wanted three", i + 1, other.len())),
+            Ok([x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
+                points.push(DVec3::new(*x, *y, *z) * unit)
+            }
+            Ok(other) if other.len() != 3 => {
+                return Err(format!("line {}: {} numbers, wanted three", i + 1, other.len()));
+            }
             Err(_) if points.is_empty() && i == 0 => {}
-            _ => return Err(format!("line {}: `{}` is not three finite numbers", i + 1, line.chars().take(40).collect::<String>())),
+            _ => {
+                return Err(format!(
+                    "line {}: `{}` is not three finite numbers",
+                    i + 1,
+                    line.chars().take(40).collect::<String>()
+                ));
+            }
         }
     }
     Ok(points)
@@ -168,7 +181,8 @@ pub fn read_points(text: &str, unit: f64) -> Result<Vec<DVec3>, String> {
 /// Corners of a mesh and the corners of each triangle.
 pub type Triangles = (Vec<DVec3>, Vec<[u32; 3]>);
 
-/// Corners and triangles of a Wavefront OBJ text: `v` and `f` lines; polygons are cut into fans; all else is passed over.
+/// Corners and triangles of a Wavefront OBJ text: `v` and `f` lines; polygons are cut into fans; all else is passed
+/// over.
 pub fn read_obj(text: &str, unit: f64) -> Result<Triangles, String> {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for (i, line) in text.lines().enumerate() {
@@ -176,7 +190,8 @@ pub fn read_obj(text: &str, unit: f64) -> Result<Triangles, String> {
         let wrong = |what: &str| Err(format!("line {}: {what}", i + 1));
         match words.next() {
             Some("v") => {
-                let numbers: Vec<f64> = words.take(3).filter_map(|w| w.parse().ok()).filter(|v: &f64| v.is_finite()).collect();
+                let numbers: Vec<f64> =
+                    words.take(3).filter_map(|w| w.parse().ok()).filter(|v: &f64| v.is_finite()).collect();
                 let [x, y, z] = numbers.as_slice() else { return wrong("a corner is three finite numbers") };
                 vertices.push(DVec3::new(*x, *y, *z) * unit);
             }
@@ -189,7 +204,9 @@ pub fn read_obj(text: &str, unit: f64) -> Result<Triangles, String> {
                         Ok(n) if n < 0 => Some(vertices.len() as i64 + n),
                         _ => None,
                     };
-                    let Some(index) = index.and_then(|n| u32::try_from(n).ok()).filter(|n| (*n as usize) < vertices.len()) else {
+                    let Some(index) =
+                        index.and_then(|n| u32::try_from(n).ok()).filter(|n| (*n as usize) < vertices.len())
+                    else {
                         return wrong(&format!("`{word}` does not name a corner before it"));
                     };
                     corners.push(index);

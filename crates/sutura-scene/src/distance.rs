@@ -1,5 +1,5 @@
-//! Distances that expressions ask for: between threads, and of threads from shapes. Brute force over the elements; its own code, like
-//! the audit, so that a probe of a gap does not lean on the contact solver.
+//! Distances that expressions ask for: between threads, and of threads from shapes. Brute force over the elements; its
+//! own code, like the audit, so that a probe of a gap does not lean on the contact solver.
 
 use sutura::glam::DVec3;
 use sutura::{Geometry, Pose};
@@ -57,7 +57,9 @@ fn point_shape(p: DVec3, geometry: &Geometry) -> f64 {
     match geometry {
         Geometry::Plane => p.z,
         Geometry::Sphere { radius } => p.length() - radius,
-        Geometry::Capsule { radius, half_length } => (p - DVec3::Z * p.z.clamp(-half_length, *half_length)).length() - radius,
+        Geometry::Capsule { radius, half_length } => {
+            (p - DVec3::Z * p.z.clamp(-half_length, *half_length)).length() - radius
+        }
         Geometry::Cylinder { radius, half_length } => {
             let (side, end) = (p.truncate().length() - radius, p.z.abs() - half_length);
             side.max(0.0).hypot(end.max(0.0)) + side.max(end).min(0.0)
@@ -65,7 +67,10 @@ fn point_shape(p: DVec3, geometry: &Geometry) -> f64 {
         Geometry::Box { half_sides } => boxed(p.abs() - *half_sides),
         Geometry::Mesh { vertices, triangles } => {
             let corner = |i: u32| vertices.get(i as usize).copied().unwrap_or(DVec3::NAN);
-            triangles.iter().map(|t| point_triangle(p, corner(t[0]), corner(t[1]), corner(t[2]))).fold(f64::INFINITY, f64::min)
+            triangles
+                .iter()
+                .map(|t| point_triangle(p, corner(t[0]), corner(t[1]), corner(t[2])))
+                .fold(f64::INFINITY, f64::min)
         }
     }
 }
@@ -100,8 +105,16 @@ mod tests {
             (v(0.0, 4.0, 5.0), Geometry::Cylinder { radius: 1.0, half_length: 1.0 }, 4.9),
             (v(0.0, 0.5, 0.0), Geometry::Cylinder { radius: 1.0, half_length: 1.0 }, -0.6),
             (v(0.0, 4.0, 5.0), Geometry::Box { half_sides: DVec3::ONE }, 4.9),
-            (v(0.1, 0.1, 0.7), Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles: vec![[0, 1, 2]] }, 0.6),
-            (v(-0.4, 0.1, 0.3), Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles: vec![[0, 1, 2]] }, 0.4),
+            (
+                v(0.1, 0.1, 0.7),
+                Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles: vec![[0, 1, 2]] },
+                0.6,
+            ),
+            (
+                v(-0.4, 0.1, 0.3),
+                Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles: vec![[0, 1, 2]] },
+                0.4,
+            ),
         ] {
             assert!((ball(p, &g) - wanted).abs() < 1e-8, "{g:?}: {}", ball(p, &g));
         }

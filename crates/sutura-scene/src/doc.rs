@@ -1,5 +1,5 @@
-//! A TOML document read with its places: every value knows its line and its key, and problems are collected instead of stopping
-//! at the first.
+//! A TOML document read with its places: every value knows its line and its key, and problems are collected instead of
+//! stopping at the first.
 
 use crate::error::{Problem, SceneError, suggest};
 use crate::set::Setting;
@@ -39,7 +39,14 @@ impl std::fmt::Display for Location {
 impl Location {
     /// A problem at this place.
     pub fn problem(&self, message: impl Into<String>) -> Problem {
-        Problem { file: self.file.clone(), line: self.line, column: None, key: self.key.clone(), message: message.into(), help: None }
+        Problem {
+            file: self.file.clone(),
+            line: self.line,
+            column: None,
+            key: self.key.clone(),
+            message: message.into(),
+            help: None,
+        }
     }
     /// An error with one problem at this place.
     pub fn error(&self, message: impl Into<String>) -> SceneError {
@@ -56,7 +63,12 @@ impl Doc {
             end = setting.end();
             setting
         };
-        Doc { file: file.into(), text: text.into(), settings: settings.iter().map(setting).collect(), problems: RefCell::default() }
+        Doc {
+            file: file.into(),
+            text: text.into(),
+            settings: settings.iter().map(setting).collect(),
+            problems: RefCell::default(),
+        }
     }
     pub fn text(&self) -> &str {
         &self.text
@@ -102,7 +114,11 @@ impl Doc {
         let mut problems = self.problems.borrow().clone();
         problems.sort_by_key(|(at, _)| *at);
         problems.dedup();
-        if problems.is_empty() { Ok(()) } else { Err(SceneError { problems: problems.into_iter().map(|(_, p)| p).collect() }) }
+        if problems.is_empty() {
+            Ok(())
+        } else {
+            Err(SceneError { problems: problems.into_iter().map(|(_, p)| p).collect() })
+        }
     }
 }
 
@@ -155,7 +171,8 @@ impl<'d> Table<'d> {
     /// A key in the table that looks like `key` misspelled.
     fn misspelled(&self, key: &str) -> Option<String> {
         let known = self.known.borrow();
-        let others: Vec<&str> = self.map.keys().map(|k| k.get_ref().as_ref()).filter(|k: &&str| !known.iter().any(|n| n == k)).collect();
+        let others: Vec<&str> =
+            self.map.keys().map(|k| k.get_ref().as_ref()).filter(|k: &&str| !known.iter().any(|n| n == k)).collect();
         crate::error::nearest(key, others).map(|k| format!("there is a `{k}`"))
     }
     /// Notes a problem with the table as a whole.
@@ -269,7 +286,9 @@ impl<'d> Value<'d> {
         if let Some(v) = self.plain_number() {
             return Some(v);
         }
-        let DeValue::String(text) = self.node else { return self.wrong(&format!("{dim}: a finite number, or a text such as \"1 {}\"", dim.si_unit())) };
+        let DeValue::String(text) = self.node else {
+            return self.wrong(&format!("{dim}: a finite number, or a text such as \"1 {}\"", dim.si_unit()));
+        };
         match parse_quantity(text) {
             Ok(q) if dim.accepts(q.dim) => Some(q.value),
             // A text without unit is a slip more often than SI.
@@ -303,12 +322,23 @@ impl<'d> Value<'d> {
     }
     pub fn array(&self, wanted: &str) -> Option<Vec<Value<'d>>> {
         let DeValue::Array(items) = self.node else { return self.wrong(wanted) };
-        let item = |(i, v): (usize, &'d Spanned<DeValue<'d>>)| Value { doc: self.doc, node: v.get_ref(), span: v.span(), path: format!("{}[{i}]", self.path) };
+        let item = |(i, v): (usize, &'d Spanned<DeValue<'d>>)| Value {
+            doc: self.doc,
+            node: v.get_ref(),
+            span: v.span(),
+            path: format!("{}[{i}]", self.path),
+        };
         Some(items.iter().enumerate().map(item).collect())
     }
     pub fn table(&self) -> Option<Table<'d>> {
         match self.node {
-            DeValue::Table(map) => Some(Table { doc: self.doc, map, span: self.span.clone(), path: self.path.clone(), known: RefCell::default() }),
+            DeValue::Table(map) => Some(Table {
+                doc: self.doc,
+                map,
+                span: self.span.clone(),
+                path: self.path.clone(),
+                known: RefCell::default(),
+            }),
             _ => self.wrong("a table { key = value, .. }"),
         }
     }
@@ -328,7 +358,10 @@ impl<'d> Value<'d> {
                     return None;
                 }
             };
-            let numbers: Option<Vec<f64>> = inside.split(',').map(|n| n.trim().parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v * unit.size)).collect();
+            let numbers: Option<Vec<f64>> = inside
+                .split(',')
+                .map(|n| n.trim().parse::<f64>().ok().filter(|v| v.is_finite()).map(|v| v * unit.size))
+                .collect();
             return numbers.or_else(|| self.wrong(wanted));
         }
         self.array(wanted)?.iter().map(|v| v.quantity(dim)).collect()
@@ -360,7 +393,11 @@ impl<'d> Value<'d> {
             return Some(t.clone());
         }
         self.problem(
-            format!("\"{}\" is not one of: {}", shorten(&text), words.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ")),
+            format!(
+                "\"{}\" is not one of: {}",
+                shorten(&text),
+                words.iter().map(|(w, _)| *w).collect::<Vec<_>>().join(", ")
+            ),
             crate::error::nearest(&text, words.iter().map(|(w, _)| *w)).map(|n| format!("did you mean \"{n}\"?")),
         );
         None

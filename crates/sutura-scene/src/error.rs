@@ -63,7 +63,16 @@ impl std::error::Error for SceneError {}
 impl SceneError {
     /// A problem with a file as a whole.
     pub(crate) fn of_file(file: impl Into<String>, message: impl Into<String>) -> Self {
-        SceneError { problems: vec![Problem { file: file.into(), line: None, column: None, key: String::new(), message: message.into(), help: None }] }
+        SceneError {
+            problems: vec![Problem {
+                file: file.into(),
+                line: None,
+                column: None,
+                key: String::new(),
+                message: message.into(),
+                help: None,
+            }],
+        }
     }
 }
 

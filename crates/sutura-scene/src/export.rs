@@ -1,7 +1,7 @@
 //! Scenes and recordings as files that other programs open: glTF (GLB), VTK, OBJ, CSV.
 //!
-//! An [`Exporter`] is given moments in order of time, from a recording ([`Moment::of_frame`]) or from a run under way ([`Moment::of_runner`]), which also
-//! knows velocities. Equal moments give equal bytes.
+//! An [`Exporter`] is given moments in order of time, from a recording ([`Moment::of_frame`]) or from a run under way
+//! ([`Moment::of_runner`]), which also knows velocities. Equal moments give equal bytes.
 
 mod csv;
 mod glb;
@@ -16,9 +16,20 @@ use sutura::glam::{DQuat, DVec3};
 use sutura::skin::{Skin, SkinSpec, TriangleMesh, shape_mesh};
 use sutura::{ContactWith, Geometry, Pose, Profile};
 
-/// Colors of threads, one after the other (sRGB), chosen to be told apart also by the color-blind (after Okabe and Ito 2008, darkened a little).
-pub const THREAD_COLORS: [[u8; 3]; 10] =
-    [[38, 84, 160], [222, 128, 20], [0, 140, 105], [190, 70, 130], [110, 80, 170], [150, 110, 60], [70, 70, 75], [120, 165, 30], [0, 155, 190], [205, 60, 50]];
+/// Colors of threads, one after the other (sRGB), chosen to be told apart also by the color-blind (after Okabe and Ito
+/// 2008, darkened a little).
+pub const THREAD_COLORS: [[u8; 3]; 10] = [
+    [38, 84, 160],
+    [222, 128, 20],
+    [0, 140, 105],
+    [190, 70, 130],
+    [110, 80, 170],
+    [150, 110, 60],
+    [70, 70, 75],
+    [120, 165, 30],
+    [0, 155, 190],
+    [205, 60, 50],
+];
 
 /// Sides of round shapes.
 const SHAPE_SIDES: u32 = 48;
@@ -49,7 +60,8 @@ pub struct Options {
     pub sides: u32,
     /// Rings of vertices an element.
     pub rings: u32,
-    /// Direction of the scene that is up where glTF says what is up, a unit vector: y as in glTF turns nothing. Other formats are not turned.
+    /// Direction of the scene that is up where glTF says what is up, a unit vector: y as in glTF turns nothing. Other
+    /// formats are not turned.
     pub up: DVec3,
 }
 
@@ -128,7 +140,9 @@ pub enum ExportError {
         last: f64,
     },
     /// A GLB file is at most 4 GiB.
-    #[error("the file would be larger than a GLB can be (4 GiB): export fewer frames a second (`--fps`), or a part (`--from`, `--to`)")]
+    #[error(
+        "the file would be larger than a GLB can be (4 GiB): export fewer frames a second (`--fps`), or a part (`--from`, `--to`)"
+    )]
     TooLarge,
 }
 
@@ -180,7 +194,10 @@ impl Exporter {
             return bad(format!("{} frames a second: wanted a number > 0", options.rate));
         }
         if options.from.is_nan() || options.to.is_nan() || options.from > options.to {
-            return bad(format!("from {} s to {} s: wanted the first time not after the last", options.from, options.to));
+            return bad(format!(
+                "from {} s to {} s: wanted the first time not after the last",
+                options.from, options.to
+            ));
         }
         if !options.up.is_normalized() {
             return bad(format!("up is {}: wanted a unit vector", options.up));
@@ -199,7 +216,8 @@ impl Exporter {
         if time < self.options.from - SLACK || time > self.options.to + SLACK {
             return false;
         }
-        let period = (time - self.options.from.max(0.0)).max(0.0) * self.options.rate + SLACK * self.options.rate.max(1.0);
+        let period =
+            (time - self.options.from.max(0.0)).max(0.0) * self.options.rate + SLACK * self.options.rate.max(1.0);
         let number = period as u64;
         if self.moments > 0 && number < self.due {
             return false;
@@ -275,7 +293,9 @@ impl Output {
         for entry in std::fs::read_dir(folder).map_err(failed(folder))? {
             let path = entry.map_err(failed(folder))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            let number = ["threads_", "shapes_", "frame_"].iter().find_map(|start| name.strip_prefix(start)?.strip_suffix(ending));
+            let number = ["threads_", "shapes_", "frame_"]
+                .iter()
+                .find_map(|start| name.strip_prefix(start)?.strip_suffix(ending));
             if number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit())) {
                 std::fs::remove_file(&path).map_err(failed(&path))?;
             }
@@ -309,13 +329,17 @@ impl Looks {
     }
 }
 
-/// The tube of a thread: as it was recorded, or by the distances of its particles, round and closed where the last one lies on the first.
+/// The tube of a thread: as it was recorded, or by the distances of its particles, round and closed where the last one
+/// lies on the first.
 fn tube(thread: &Thread, strand: &Strand) -> SkinSpec {
     let x = &strand.positions;
     match &thread.look {
-        Some(look) if look.lengths.len() == strand.orientations.len() => {
-            SkinSpec { section: look.section.into(), size: Profile(look.size.clone()), seam: look.seam, ..SkinSpec::new(look.lengths.clone(), thread.radius) }
-        }
+        Some(look) if look.lengths.len() == strand.orientations.len() => SkinSpec {
+            section: look.section.into(),
+            size: Profile(look.size.clone()),
+            seam: look.seam,
+            ..SkinSpec::new(look.lengths.clone(), thread.radius)
+        },
         _ => SkinSpec {
             seam: (x.len() > 3 && x.first() == x.last()).then_some(0.0),
             ..SkinSpec::new(x.windows(2).map(|w| (w[1] - w[0]).length()).collect(), thread.radius)
@@ -353,7 +377,12 @@ impl Moment {
             }
             for contact in &forces.contacts {
                 for (place, sign) in contact.places().zip([1.0, -1.0]) {
-                    moment.push(place.thread as usize, place.element as usize, f64::from(place.s), point(&contact.force) * sign);
+                    moment.push(
+                        place.thread as usize,
+                        place.element as usize,
+                        f64::from(place.s),
+                        point(&contact.force) * sign,
+                    );
                 }
             }
         }
@@ -366,7 +395,8 @@ impl Moment {
         let mut slots = Vec::new();
         for rod in runner.rods() {
             let (positions, orientations) = (rod.positions().to_vec(), rod.orientations().to_vec());
-            let mut strand = Strand { positions, orientations, velocities: Some(rod.velocities().to_vec()), loads: None };
+            let mut strand =
+                Strand { positions, orientations, velocities: Some(rod.velocities().to_vec()), loads: None };
             strand.load((0..rod.n_elements()).map(|e| rod.tension(e)).collect());
             moment.threads.push(strand);
             slots.push(rod.slot());

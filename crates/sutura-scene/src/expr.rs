@@ -1,7 +1,8 @@
-//! The small language of conditions, probes and checks: numbers with units, places on threads, functions of the running world.
+//! The small language of conditions, probes and checks: numbers with units, places on threads, functions of the running
+//! world.
 //!
-//! Names, argument kinds and dimensions are checked when a scene is read, so that evaluation cannot fail; what is not there at the
-//! moment (a grip that does not hold) is not-a-number, and no comparison with that is true.
+//! Names, argument kinds and dimensions are checked when a scene is read, so that evaluation cannot fail; what is not
+//! there at the moment (a grip that does not hold) is not-a-number, and no comparison with that is true.
 
 mod eval;
 mod function;
@@ -53,7 +54,8 @@ impl Names {
 
 /// Whether a word can be a name: letters, digits and `_`, beginning with a letter.
 pub fn is_name(word: &str) -> bool {
-    word.chars().next().is_some_and(|c| c.is_ascii_alphabetic()) && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    word.chars().next().is_some_and(|c| c.is_ascii_alphabetic())
+        && word.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 /// A place along a thread.
@@ -311,9 +313,16 @@ mod tests {
 
     #[test]
     fn every_function_is_documented() {
-        let text = std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md")).unwrap();
+        let text =
+            std::fs::read_to_string(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats.md"))
+                .unwrap();
         for name in function::function_names() {
-            assert!(text.contains(&format!("`{name}")) || text.contains(&format!(" {name} ")) || text.contains(&format!(" {name}`")), "{name}");
+            assert!(
+                text.contains(&format!("`{name}"))
+                    || text.contains(&format!(" {name} "))
+                    || text.contains(&format!(" {name}`")),
+                "{name}"
+            );
         }
     }
 

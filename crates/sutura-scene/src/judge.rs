@@ -35,11 +35,18 @@ impl Judge {
         self.audit.as_ref()?.report().max_elongation.iter().find(|e| e.0 == slot).map(|e| e.1)
     }
     /// The first passages in words.
-    pub fn passages(&self, thread: impl Fn(usize) -> String, shape: impl Fn(usize) -> String, start: f64) -> Vec<String> {
+    pub fn passages(
+        &self,
+        thread: impl Fn(usize) -> String,
+        shape: impl Fn(usize) -> String,
+        start: f64,
+    ) -> Vec<String> {
         let Some(audit) = &self.audit else { return Vec::new() };
         let words = |c: &sutura::audit::Crossing| {
             let what = match c.what {
-                Pair::Threads { a, b } => format!("{} element {} and {} element {}", thread(a.0), a.1, thread(b.0), b.1),
+                Pair::Threads { a, b } => {
+                    format!("{} element {} and {} element {}", thread(a.0), a.1, thread(b.0), b.1)
+                }
                 Pair::Shape { thread: t, shape: s } => format!("{} element {} and {}", thread(t.0), t.1, shape(s)),
             };
             format!("{:.6} s: {what}", c.time - start)
@@ -48,18 +55,23 @@ impl Judge {
     }
 }
 
-/// Recognizes the knot of a thread. `held`: the arc lengths at which it is held; when both halves are, the piece between the outermost
-/// two is closed along rays away from its middle, otherwise the ends count as free. A closed thread needs neither.
+/// Recognizes the knot of a thread. `held`: the arc lengths at which it is held; when both halves are, the piece
+/// between the outermost two is closed along rays away from its middle, otherwise the ends count as free. A closed
+/// thread needs neither.
 pub fn recognize(rod: &RodView<'_>, held: &[f64], seed: u64) -> KnotReport {
     let points = rod.positions();
     let length = rod.rest_length();
-    let (first, last) = (held.iter().copied().fold(f64::INFINITY, f64::min), held.iter().copied().fold(f64::NEG_INFINITY, f64::max));
+    let (first, last) =
+        (held.iter().copied().fold(f64::INFINITY, f64::min), held.iter().copied().fold(f64::NEG_INFINITY, f64::max));
     let recognition = if rod.is_closed() {
         knot::recognize(points, Ends::Closed, seed)
     } else if first < 0.5 * length && last > 0.5 * length {
         let arc = |i: usize| rod.arc(i);
         // A little tolerance, since arc lengths are sums.
-        let inside: Vec<DVec3> = (0..points.len()).filter(|i| arc(*i) >= first - 1e-9 * length && arc(*i) <= last + 1e-9 * length).map(|i| points[i]).collect();
+        let inside: Vec<DVec3> = (0..points.len())
+            .filter(|i| arc(*i) >= first - 1e-9 * length && arc(*i) <= last + 1e-9 * length)
+            .map(|i| points[i])
+            .collect();
         let middle = inside.iter().sum::<DVec3>() / inside.len().max(1) as f64;
         match (inside.first(), inside.last()) {
             (Some(a), Some(b)) => knot::recognize(&inside, Ends::Held { start: *a - middle, end: *b - middle }, seed),
@@ -90,11 +102,13 @@ fn form(rod: &RodView<'_>) -> Option<FormReport> {
     Some(FormReport { verdict: form.verdict.name().into(), share: form.share, turning_rad: form.turning })
 }
 
-/// How far the ends are extended for the writhe, in lengths of the thread. What joins them there counts for about 1 / this.
+/// How far the ends are extended for the writhe, in lengths of the thread. What joins them there counts for about 1 /
+/// this.
 const TAILS: f64 = 1e4;
 
-/// Writhe of a thread in turns, its ends extended far along the tangents there: twist + writhe of a thread held by two clamps then
-/// changes by their turning alone, and jumps by 2 where the thread passes through itself. A closed thread as it is.
+/// Writhe of a thread in turns, its ends extended far along the tangents there: twist + writhe of a thread held by two
+/// clamps then changes by their turning alone, and jumps by 2 where the thread passes through itself. A closed thread
+/// as it is.
 pub fn writhe(rod: &RodView<'_>) -> f64 {
     let points = rod.positions();
     if rod.is_closed() {

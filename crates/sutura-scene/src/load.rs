@@ -12,16 +12,17 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef, Scene, ShapeDef, Span, Step, Strength,
-    Take, ThreadDef, Wanted, WeldDef, engine_place,
+    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef,
+    Scene, ShapeDef, Span, Step, Strength, Take, ThreadDef, Wanted, WeldDef, engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};
 use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3, EulerRot};
 use sutura::math::{exp, frame_from_tangent, log};
 use sutura::{
-    Along, Closure, Friction, Geometry, Hold, Integrator, Material, PaperSettings, Place, Plasticity, Pose, Profile, ReelLaw, RestShape, RodSpec, Section,
-    Settings, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, SweepOrder, WeldRest, transported_frames,
+    Along, Closure, Friction, Geometry, Hold, Integrator, Material, PaperSettings, Place, Plasticity, Pose, Profile,
+    ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, SweepOrder,
+    WeldRest, transported_frames,
 };
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
@@ -128,7 +129,10 @@ impl<'d> Loader<'d> {
         for table in root.tables("grip") {
             if let Some(grip) = table.need("name", "the name of the grip").and_then(|v| self.find_grip(&v)) {
                 initial.extend(self.take(&table, grip, 0.0).map(|action| Step { action, location: table.location() }));
-                initial.extend(self.drive_keys(&table, Mover::Grip(grip)).map(|action| Step { action, location: table.location() }));
+                initial.extend(
+                    self.drive_keys(&table, Mover::Grip(grip))
+                        .map(|action| Step { action, location: table.location() }),
+                );
             }
             table.finish();
         }
@@ -143,13 +147,19 @@ impl<'d> Loader<'d> {
         let probes = self.probes(root);
         let phase_tables = root.tables("phase");
         if phase_tables.is_empty() {
-            root.problem("there is no `[[phase]]`: nothing would happen", Some("for instance [[phase]] with name = \"run\" and duration = \"1 s\"".into()));
+            root.problem(
+                "there is no `[[phase]]`: nothing would happen",
+                Some("for instance [[phase]] with name = \"run\" and duration = \"1 s\"".into()),
+            );
         }
         let phases: Vec<Phase> = phase_tables.iter().enumerate().filter_map(|(i, t)| self.phase(t, i)).collect();
         let frames = frame_rate * phases.iter().map(Phase::longest).sum::<f64>();
         let longest = phase_tables.iter().zip(&phases).max_by(|a, b| a.1.longest().total_cmp(&b.1.longest()));
         if let Some((table, phase)) = longest.filter(|_| frames > MOST_FRAMES) {
-            let problem = format!("it may take {:e} s: with the other phases {frames:e} frames, at most {MOST_FRAMES:e} are run", phase.longest());
+            let problem = format!(
+                "it may take {:e} s: with the other phases {frames:e} frames, at most {MOST_FRAMES:e} are run",
+                phase.longest()
+            );
             table.problem(problem, None);
         }
         let profiles = root.tables("profile").iter().filter_map(|t| self.profile(t)).collect();
@@ -229,7 +239,13 @@ impl<'d> Loader<'d> {
             }
         }
         for phase in root.tables("phase") {
-            self.phases.push(phase.get("name").filter(Value::is_text).and_then(|v| v.text()).map_or(String::new(), std::borrow::Cow::into_owned));
+            self.phases.push(
+                phase
+                    .get("name")
+                    .filter(Value::is_text)
+                    .and_then(|v| v.text())
+                    .map_or(String::new(), std::borrow::Cow::into_owned),
+            );
             for action in phase.tables("action") {
                 if let Some(name) = action.get("take").filter(Value::is_text).and_then(|v| self.checked_name(&v)) {
                     self.add_grip(&name);
@@ -271,7 +287,10 @@ impl<'d> Loader<'d> {
         let name = value.text()?;
         let found = self.names.get(&name).and_then(&pick);
         if found.is_none() {
-            value.problem(format!("no {what} is called `{name}`"), suggest(&name, self.names.which(|n| pick(n).is_some())));
+            value.problem(
+                format!("no {what} is called `{name}`"),
+                suggest(&name, self.names.which(|n| pick(n).is_some())),
+            );
         }
         found
     }
@@ -301,7 +320,10 @@ impl<'d> Loader<'d> {
         let name = value.text()?;
         let found = self.phases.iter().position(|p| *p == name);
         if found.is_none() {
-            value.problem(format!("no phase is called `{name}`"), suggest(&name, self.phases.iter().map(String::as_str)));
+            value.problem(
+                format!("no phase is called `{name}`"),
+                suggest(&name, self.phases.iter().map(String::as_str)),
+            );
         }
         found
     }
@@ -383,7 +405,10 @@ impl<'d> Loader<'d> {
         if let Some(value) = table.get("paper") {
             match (&mut settings.solver, value.table()) {
                 (Solver::Paper(numbers), Some(table)) => paper_numbers(&table, numbers),
-                (Solver::Direct, Some(_)) => value.problem("numbers of the paper's solver, which is not asked for", Some("add method = \"paper\"".into())),
+                (Solver::Direct, Some(_)) => value.problem(
+                    "numbers of the paper's solver, which is not asked for",
+                    Some("add method = \"paper\"".into()),
+                ),
                 (_, None) => {}
             }
         }
@@ -398,7 +423,10 @@ impl<'d> Loader<'d> {
             if substeps > MOST_SUBSTEPS as f64 * (1.0 + 1e-9)
                 && let Some(value) = table.get("substep")
             {
-                value.problem(format!("{v:e} s: {substeps:e} substeps in a frame, at most {MOST_SUBSTEPS} are taken"), None);
+                value.problem(
+                    format!("{v:e} s: {substeps:e} substeps in a frame, at most {MOST_SUBSTEPS} are taken"),
+                    None,
+                );
             }
             settings.substep = v;
         }
@@ -469,7 +497,10 @@ impl<'d> Loader<'d> {
             let name = v.text()?;
             let found = self.surfaces.iter().position(|s| *s == name);
             if found.is_none() {
-                v.problem(format!("no thread or shape has the surface `{name}`"), suggest(&name, self.surfaces.iter().map(String::as_str)));
+                v.problem(
+                    format!("no thread or shape has the surface `{name}`"),
+                    suggest(&name, self.surfaces.iter().map(String::as_str)),
+                );
             }
             found.map(|i| i as u32)
         };
@@ -508,7 +539,10 @@ fn in_range_value(value: &Value<'_>, dim: Dim, from: f64, to: f64) -> Option<f64
     if (from..=to).contains(&v) {
         return Some(v);
     }
-    value.problem(if to > 1e8 { format!("{v} must be at least {from}") } else { format!("{v} must be from {from} to {to}") }, None);
+    value.problem(
+        if to > 1e8 { format!("{v} must be at least {from}") } else { format!("{v} must be from {from} to {to}") },
+        None,
+    );
     None
 }
 

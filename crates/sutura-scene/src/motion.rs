@@ -9,7 +9,8 @@ use sutura::math::{exp, log, rotation_arc};
 /// How the way between keys is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ease {
-    /// Quintic step: starts and ends each piece at rest, acceleration continuous; the top speed is 1.875 times the mean.
+    /// Quintic step: starts and ends each piece at rest, acceleration continuous; the top speed is 1.875 times the
+    /// mean.
     Smooth,
     /// Constant speed between keys.
     Linear,
@@ -147,7 +148,11 @@ impl MotionPiece {
             Path::Piece(p) => p.at(eased),
             Path::Cubic { from, to, v0, v1 } => cubic(*from, *to, *v0, *v1, span, s),
         };
-        let phi = if self.ease == Ease::Spline { cubic(DVec3::ZERO, self.turn.phi, self.turn.w0, self.turn.w1, span, s) } else { self.turn.phi * eased };
+        let phi = if self.ease == Ease::Spline {
+            cubic(DVec3::ZERO, self.turn.phi, self.turn.w0, self.turn.w1, span, s)
+        } else {
+            self.turn.phi * eased
+        };
         Pose::new(position, (exp_any(phi) * self.turn_from).normalize())
     }
 }
@@ -158,8 +163,8 @@ fn exp_any(phi: DVec3) -> DQuat {
 }
 
 impl Plan {
-    /// The motion from a pose. `taken`: where the grip was taken; `shapes`: poses of the shapes now; `at`: how late in the phase
-    /// the move begins is always 0.
+    /// The motion from a pose. `taken`: where the grip was taken; `shapes`: poses of the shapes now; `at`: how late in
+    /// the phase the move begins is always 0.
     pub fn motion(&self, start: Pose, taken: Pose, shape: impl Fn(usize) -> Pose) -> Motion {
         let absolute = |p: DVec3| match self.relative {
             Relative::World => p,
@@ -174,7 +179,9 @@ impl Plan {
                 Goal::Stay => Piece::Line { from: here.position, to: here.position },
                 Goal::To(p) => Piece::Line { from: here.position, to: absolute(p) },
                 Goal::By(d) => Piece::Line { from: here.position, to: here.position + d },
-                Goal::Around { center, axis, angle, advance, .. } => Piece::Turn { start: here.position, center: absolute(center), axis, angle, advance },
+                Goal::Around { center, axis, angle, advance, .. } => {
+                    Piece::Turn { start: here.position, center: absolute(center), axis, angle, advance }
+                }
             };
             let carried = match key.goal {
                 Goal::Around { axis, angle, carry: true, .. } => axis * angle,
@@ -191,9 +198,12 @@ impl Plan {
                 When::After(d) => at + d,
                 When::Speed(v) => at + path.length() / v,
             };
-            // Along a spline an arc becomes several keys, so that the spline stays on it (to 0.1 % of its radius at 15 degrees).
+            // Along a spline an arc becomes several keys, so that the spline stays on it (to 0.1 % of its radius at 15
+            // degrees).
             let parts = match (&path, self.ease) {
-                (Piece::Turn { angle, .. }, Ease::Spline) => ((angle.abs() / (PI / 12.0)).ceil() as usize).clamp(1, 1000),
+                (Piece::Turn { angle, .. }, Ease::Spline) => {
+                    ((angle.abs() / (PI / 12.0)).ceil() as usize).clamp(1, 1000)
+                }
                 _ => 1,
             };
             for k in 0..parts {
@@ -222,7 +232,8 @@ impl Plan {
         motion
     }
 
-    /// Seconds that the plan takes when every key says so; speeds count with the distance known from `by` and arcs only.
+    /// Seconds that the plan takes when every key says so; speeds count with the distance known from `by` and arcs
+    /// only.
     pub fn least_duration(&self) -> f64 {
         self.keys.iter().fold(0.0, |at, key| match key.when {
             When::At(t) => t.max(at),
@@ -235,8 +246,8 @@ impl Plan {
     }
 }
 
-/// Velocities at inner keys: the mean of the neighboring pieces' mean velocities, each weighted with the other's duration
-/// (Catmull-Rom for uneven times); at rest at both ends.
+/// Velocities at inner keys: the mean of the neighboring pieces' mean velocities, each weighted with the other's
+/// duration (Catmull-Rom for uneven times); at rest at both ends.
 fn smooth_spline(pieces: &mut [MotionPiece]) {
     let mean = |p: &MotionPiece| {
         let span = p.end - p.begin;
@@ -287,8 +298,8 @@ impl Motion {
         }
         pose
     }
-    /// The start orientation carried along the direction of motion without twist, the difference at the start closed smoothly over
-    /// the first quarter of the move.
+    /// The start orientation carried along the direction of motion without twist, the difference at the start closed
+    /// smoothly over the first quarter of the move.
     fn orientations_along(&self, sign: f64) -> Vec<DQuat> {
         let duration = self.duration();
         let axis = DVec3::Z * sign;
@@ -349,7 +360,14 @@ mod tests {
 
     #[test]
     fn a_spline_passes_its_keys_without_stopping_or_jumping_in_velocity() {
-        let m = run(&plan(Ease::Spline, vec![to(1.0, 0.0, 0.0, When::After(1.0)), to(1.0, 1.0, 0.0, When::After(0.5)), to(0.0, 1.0, 1.0, When::After(1.0))]));
+        let m = run(&plan(
+            Ease::Spline,
+            vec![
+                to(1.0, 0.0, 0.0, When::After(1.0)),
+                to(1.0, 1.0, 0.0, When::After(0.5)),
+                to(0.0, 1.0, 1.0, When::After(1.0)),
+            ],
+        ));
         assert!((m.pose(1.0).position - DVec3::X).length() < 1e-14);
         for t in [1.0, 1.5] {
             let (before, after) = (velocity(&m, t - 1e-5), velocity(&m, t + 1e-5));
@@ -362,8 +380,13 @@ mod tests {
     fn an_arc_stays_on_its_circle_in_every_mode() {
         for (ease, off) in [(Ease::Smooth, 1e-14), (Ease::Linear, 1e-14), (Ease::Spline, 1e-3)] {
             let start = Pose::at(DVec3::X);
-            let around = Goal::Around { center: DVec3::ZERO, axis: DVec3::Z, angle: 3.0 * PI, advance: 0.3, carry: true };
-            let m = plan(ease, vec![Key { goal: around, turning: Turning::Keep, when: When::After(2.0) }]).motion(start, start, |_| start);
+            let around =
+                Goal::Around { center: DVec3::ZERO, axis: DVec3::Z, angle: 3.0 * PI, advance: 0.3, carry: true };
+            let m = plan(ease, vec![Key { goal: around, turning: Turning::Keep, when: When::After(2.0) }]).motion(
+                start,
+                start,
+                |_| start,
+            );
             for i in 0..=40 {
                 let p = m.pose(f64::from(i) * 0.05).position;
                 // A cubic through 15 degree steps leaves the circle by well under 0.1 % except in its end pieces.
@@ -389,14 +412,22 @@ mod tests {
 
     #[test]
     fn speed_gives_the_time() {
-        let m = run(&plan(Ease::Smooth, vec![to(0.1, 0.0, 0.0, When::Speed(0.05)), to(0.1, 0.0, 0.0, When::Speed(0.05))]));
+        let m =
+            run(&plan(Ease::Smooth, vec![to(0.1, 0.0, 0.0, When::Speed(0.05)), to(0.1, 0.0, 0.0, When::Speed(0.05))]));
         assert!((m.duration() - 2.0).abs() < 1e-12);
         assert!(m.pose(5.0).position.distance(DVec3::X * 0.1) < 1e-15);
     }
 
     #[test]
     fn along_points_the_piece_along_the_motion() {
-        let mut p = plan(Ease::Spline, vec![to(0.0, 0.0, 1.0, When::After(1.0)), to(1.0, 0.0, 1.0, When::After(1.0)), to(1.0, 1.0, 1.0, When::After(1.0))]);
+        let mut p = plan(
+            Ease::Spline,
+            vec![
+                to(0.0, 0.0, 1.0, When::After(1.0)),
+                to(1.0, 0.0, 1.0, When::After(1.0)),
+                to(1.0, 1.0, 1.0, When::After(1.0)),
+            ],
+        );
         p.along = Some(-1.0);
         let m = run(&p);
         for t in [1.0, 1.5, 2.0, 2.5] {
@@ -413,9 +444,12 @@ mod tests {
         let start = Pose::at(DVec3::Y);
         let taken = Pose::at(DVec3::Z);
         let shape = Pose::new(DVec3::X, exp(DVec3::Z * PI));
-        for (relative, wanted) in
-            [(Relative::World, DVec3::X), (Relative::Start, DVec3::X + DVec3::Y), (Relative::Taken, DVec3::X + DVec3::Z), (Relative::Shape(0), DVec3::ZERO)]
-        {
+        for (relative, wanted) in [
+            (Relative::World, DVec3::X),
+            (Relative::Start, DVec3::X + DVec3::Y),
+            (Relative::Taken, DVec3::X + DVec3::Z),
+            (Relative::Shape(0), DVec3::ZERO),
+        ] {
             let p = Plan { relative, ..plan(Ease::Smooth, vec![to(1.0, 0.0, 0.0, When::After(1.0))]) };
             assert!(p.motion(start, taken, |_| shape).pose(1.0).position.distance(wanted) < 1e-12, "{relative:?}");
         }

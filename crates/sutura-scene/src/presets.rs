@@ -113,8 +113,8 @@ pub fn find_material(name: &str) -> Result<&'static MaterialPreset, UnknownPrese
     })
 }
 
-/// The least knot-pull strength of a thread of this size: of the kind of its material, and of the weaker kind where the material is not
-/// known. `None` where there is no limit.
+/// The least knot-pull strength of a thread of this size: of the kind of its material, and of the weaker kind where the
+/// material is not known. `None` where there is no limit.
 pub fn knot_pull(size: &Size, material: Option<&MaterialPreset>) -> Option<Figure> {
     let kinds = [(true, size.knot_pull_absorbable), (false, size.knot_pull_nonabsorbable)];
     let fits = |absorbable: bool| material.is_none_or(|m| m.absorbable == Some(absorbable));
@@ -126,7 +126,14 @@ const RANGES: &str = "lower bounds: metric number / 10 (Ph. Eur.; product catalo
 /// Where the knot-pull limits come from.
 const KNOT_PULL: &str = "USP <881> tables as recalled (kgf x 9.80665); not read again";
 
-const fn size(name: &'static str, metric: f64, range_mm: (f64, f64), middle_mm: f64, absorbable: Option<f64>, nonabsorbable: Option<f64>) -> Size {
+const fn size(
+    name: &'static str,
+    metric: f64,
+    range_mm: (f64, f64),
+    middle_mm: f64,
+    absorbable: Option<f64>,
+    nonabsorbable: Option<f64>,
+) -> Size {
     const fn pull(value: Option<f64>) -> Option<Figure> {
         match value {
             Some(value) => Some(Figure { value, unit: "N", source: KNOT_PULL, verified: false }),
@@ -143,7 +150,8 @@ const fn size(name: &'static str, metric: f64, range_mm: (f64, f64), middle_mm: 
     }
 }
 
-/// `3` stands for 3 and 4, which share their range. 2-0 is metric 3 (one source says 2.5; catalogues and a measured 0.303 mm say 3).
+/// `3` stands for 3 and 4, which share their range. 2-0 is metric 3 (one source says 2.5; catalogues and a measured
+/// 0.303 mm say 3).
 const SIZES: &[Size] = &[
     size("11-0", 0.1, (0.010, 0.019), 0.015, None, None),
     size("10-0", 0.2, (0.020, 0.029), 0.025, None, None),
@@ -174,14 +182,23 @@ const fn unverified(value: f64, unit: &'static str, source: &'static str) -> Fig
 const NALEWAY: &str = "Naleway et al. 2015, initial modulus of 3-0 thread (abstract: studylib.net/doc/10697220)";
 const TEXTBOOK: &str = "recalled textbook value, not verified";
 const MODULUS: &str = "middle of a recalled range, not verified";
-const BRAID_BENDING: &str = "assumed: braids are said to bend 10 to 100 times softer than a solid rod, no measurement was found";
+const BRAID_BENDING: &str =
+    "assumed: braids are said to bend 10 to 100 times softer than a solid rod, no measurement was found";
 const SOLID: &str = "a solid round monofilament, by definition";
 const NO_DAMPING: &str = "none assumed; no measurement was found";
-const MONO_FRICTION: &str = "engineering start value, 0.12 to 0.25 for monofilaments; falls with load; no source gives a number";
-const BRAID_FRICTION: &str = "engineering start value, 0.2 to 0.35 for braids; falls with load; no source gives a number";
+const MONO_FRICTION: &str =
+    "engineering start value, 0.12 to 0.25 for monofilaments; falls with load; no source gives a number";
+const BRAID_FRICTION: &str =
+    "engineering start value, 0.2 to 0.35 for braids; falls with load; no source gives a number";
 const POISSON: &str = "assumed for polymers, not verified";
 
-const fn monofilament(name: &'static str, title: &'static str, absorbable: bool, young_modulus: Figure, density: f64) -> MaterialPreset {
+const fn monofilament(
+    name: &'static str,
+    title: &'static str,
+    absorbable: bool,
+    young_modulus: Figure,
+    density: f64,
+) -> MaterialPreset {
     MaterialPreset {
         name,
         title,
@@ -195,7 +212,13 @@ const fn monofilament(name: &'static str, title: &'static str, absorbable: bool,
     }
 }
 
-const fn braid(name: &'static str, title: &'static str, absorbable: bool, young_modulus: Figure, density: f64) -> MaterialPreset {
+const fn braid(
+    name: &'static str,
+    title: &'static str,
+    absorbable: bool,
+    young_modulus: Figure,
+    density: f64,
+) -> MaterialPreset {
     MaterialPreset {
         bend_scale: unverified(0.02, "", BRAID_BENDING),
         friction: unverified(0.3, "", BRAID_FRICTION),
@@ -205,7 +228,13 @@ const fn braid(name: &'static str, title: &'static str, absorbable: bool, young_
 
 const MATERIALS: &[MaterialPreset] = &[
     braid("silk", "braided silk", false, read(8.7e9, "Pa", NALEWAY), 1300.0),
-    braid("polyglactin", "braided polyglactin 910 (the modulus is that of the rapid grade)", true, read(9.32e9, "Pa", NALEWAY), 1500.0),
+    braid(
+        "polyglactin",
+        "braided polyglactin 910 (the modulus is that of the rapid grade)",
+        true,
+        read(9.32e9, "Pa", NALEWAY),
+        1500.0,
+    ),
     monofilament(
         "polypropylene",
         "polypropylene monofilament; takes a plastic set at moderate load (Holmlund 1976)",
@@ -250,7 +279,9 @@ mod tests {
 
     #[test]
     fn the_knot_pull_limit_is_that_of_the_kind_of_the_material() {
-        let (size, pull) = (find_size("3-0").unwrap(), |m: &str| knot_pull(find_size("3-0").unwrap(), Some(find_material(m).unwrap())).map(|f| f.value));
+        let (size, pull) = (find_size("3-0").unwrap(), |m: &str| {
+            knot_pull(find_size("3-0").unwrap(), Some(find_material(m).unwrap())).map(|f| f.value)
+        });
         assert_eq!((pull("silk"), pull("polydioxanone"), pull("steel")), (Some(9.41), Some(17.36), None));
         assert_eq!(knot_pull(size, None).map(|f| f.value), Some(9.41));
         assert_eq!(knot_pull(find_size("9-0").unwrap(), None), None);

@@ -47,10 +47,12 @@ impl Series {
     }
     /// The table as comma-separated text; headings are `name [unit]`.
     pub fn to_csv(&self) -> String {
-        let heading: Vec<String> = self.columns.iter().map(|(n, u)| if u.is_empty() { n.clone() } else { format!("{n} [{u}]") }).collect();
+        let heading: Vec<String> =
+            self.columns.iter().map(|(n, u)| if u.is_empty() { n.clone() } else { format!("{n} [{u}]") }).collect();
         let mut text = heading.join(",") + "\n";
         for row in &self.rows {
-            let cells: Vec<String> = row.iter().map(|v| if v.is_finite() { format!("{v}") } else { String::new() }).collect();
+            let cells: Vec<String> =
+                row.iter().map(|v| if v.is_finite() { format!("{v}") } else { String::new() }).collect();
             text.push_str(&cells.join(","));
             text.push('\n');
         }
@@ -118,7 +120,8 @@ pub struct Report {
     pub phases: Vec<PhaseReport>,
     /// Whether the run came to its end; not when it was stopped before.
     pub finished: bool,
-    /// Whether it came to its end, every check passed, no phase ran out of time (where running out is a failure), and `failures` is empty.
+    /// Whether it came to its end, every check passed, no phase ran out of time (where running out is a failure), and
+    /// `failures` is empty.
     pub passed: bool,
 }
 
@@ -251,11 +254,13 @@ pub struct OverlapReport {
     pub depth_m: f64,
     /// The same over the diameter, of two threads the mean one.
     pub depth_diameters: f64,
-    /// Whether a centerline ran within the other thread, in the solid or across the mesh; else they were only pressed into each other.
+    /// Whether a centerline ran within the other thread, in the solid or across the mesh; else they were only pressed
+    /// into each other.
     pub through: bool,
 }
 
-/// Least clearance by kind of pair: (distance - radii) / thread diameter, negative overlaps. `None`: nothing was ever near.
+/// Least clearance by kind of pair: (distance - radii) / thread diameter, negative overlaps. `None`: nothing was ever
+/// near.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clearance {
     /// Between two pieces of thread.

@@ -1,17 +1,20 @@
 //! Steps a scene frame by frame: phases, motions, probes, checks, recording.
 //!
-//! Probes, checks and the recording look at the ends of frames, whose times are regular. The condition of `until` is judged after every substep,
-//! since much can happen in a frame: where it comes true the phase ends, and what is left of the frame is done under the next one.
+//! Probes, checks and the recording look at the ends of frames, whose times are regular. The condition of `until` is
+//! judged after every substep, since much can happen in a frame: where it comes true the phase ends, and what is left
+//! of the frame is done under the next one.
 
 use crate::error::SceneError;
 use crate::expr::Expr;
 use crate::report::{
-    Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, OverlapReport, PhaseReport, Report, SavedState, Series, SolverReport, ThreadReport,
-    WarningReport, WorkReport,
+    Clearance, FrameTimes, IncidentReport, KnotReport, Outcome, OverlapReport, PhaseReport, Report, SavedState, Series,
+    SolverReport, ThreadReport, WarningReport, WorkReport,
 };
 use crate::scene::{End, Late, MOST_FRAMES, Moment, Mover, Scene};
 use crate::stage::{FrameReport, Stage, lesser};
-use crate::trajectory::{Contact, Forces, Frame, Header, OnThread, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory};
+use crate::trajectory::{
+    Contact, Forces, Frame, Header, OnThread, Shape, ShapeOutline, Thread, ThreadLook, Touched, Trajectory,
+};
 use crate::watch::{Check, Probe, profile};
 use cpu_time::ThreadTime;
 use std::mem::discriminant;
@@ -88,7 +91,8 @@ pub struct Progress {
     pub phase: String,
     /// Solver time of this call \[ms\].
     pub ms: f64,
-    /// True where the frame is not finished, since the call had spent its work ([`Runner::limit_work`]): the next call goes on with it.
+    /// True where the frame is not finished, since the call had spent its work ([`Runner::limit_work`]): the next call
+    /// goes on with it.
     pub cut: bool,
     /// Whether the run is over; further calls do nothing.
     pub finished: bool,
@@ -105,7 +109,8 @@ impl Runner {
     pub fn new(scene: Scene) -> Result<Runner, SceneError> {
         Self::build(scene, false)
     }
-    /// The same, and what is done to the world is recorded, with the state hash after each step (whose time counts as the solver's).
+    /// The same, and what is done to the world is recorded, with the state hash after each step (whose time counts as
+    /// the solver's).
     pub fn recording(scene: Scene) -> Result<Runner, SceneError> {
         Self::build(scene, true)
     }
@@ -145,7 +150,11 @@ impl Runner {
             profiles: Vec::new(),
             profiles_open: (0..scene.profiles.len()).collect(),
             checks: scene.checks.iter().map(Check::new).collect(),
-            frames: Series { name: "frame".into(), columns: columns.map(|(n, u)| (n.to_owned(), u.to_owned())).to_vec(), rows: Vec::new() },
+            frames: Series {
+                name: "frame".into(),
+                columns: columns.map(|(n, u)| (n.to_owned(), u.to_owned())).to_vec(),
+                rows: Vec::new(),
+            },
             trajectory: Trajectory::default(),
             saved: Vec::new(),
             phases: Vec::new(),
@@ -182,20 +191,23 @@ impl Runner {
         Ok(runner)
     }
 
-    /// Limits the work of each call that simulates a frame, in the counts of [`StepReport::work`](sutura::StepReport::work). Where it is spent the call
-    /// returns, with the last substep that was accepted, and the next call goes on with the frame: slow motion, but no call that takes long. It is counted, so a
-    /// recording of the input plays it back as it was.
+    /// Limits the work of each call that simulates a frame, in the counts of
+    /// [`StepReport::work`](sutura::StepReport::work). Where it is spent the call returns, with the last substep that
+    /// was accepted, and the next call goes on with the frame: slow motion, but no call that takes long. It is counted,
+    /// so a recording of the input plays it back as it was.
     pub fn limit_work(&mut self, most: Option<f64>) {
         self.most_work = most;
     }
 
-    /// Simulates one frame, or what there is of the last one where a condition ends the run within it. Does nothing once the run is finished.
+    /// Simulates one frame, or what there is of the last one where a condition ends the run within it. Does nothing
+    /// once the run is finished.
     pub fn step_frame(&mut self) -> Progress {
         self.step_frame_with(&mut |_, _| {})
     }
 
-    /// The same with a hand from outside: before each piece of the frame `drive` gets the world and the part of the frame that will be done with
-    /// that piece. What it does is recorded like everything else. What the scene moves itself is to be lent before ([`Runner::lend`]).
+    /// The same with a hand from outside: before each piece of the frame `drive` gets the world and the part of the
+    /// frame that will be done with that piece. What it does is recorded like everything else. What the scene moves
+    /// itself is to be lent before ([`Runner::lend`]).
     pub fn step_frame_with(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Progress {
         if !self.finished {
             let Some((report, cpu, stuck)) = self.simulate(drive) else { return self.progress() };
@@ -223,7 +235,8 @@ impl Runner {
         self.progress()
     }
 
-    /// A frame of the world after the run is over, for hands from outside. Nothing of it is in the report; what went wrong comes back.
+    /// A frame of the world after the run is over, for hands from outside. Nothing of it is in the report; what went
+    /// wrong comes back.
     pub fn step_beyond(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Vec<Incident> {
         let dt = 1.0 / self.scene.frame_rate;
         let pieces = self.pieces(dt);
@@ -243,8 +256,8 @@ impl Runner {
         incidents
     }
 
-    /// Somebody else moves this from here on, as a hand that takes it over: it stands still until they do, and the scene's own motion of it goes on
-    /// without it. Whether there is such a thing now.
+    /// Somebody else moves this from here on, as a hand that takes it over: it stands still until they do, and the
+    /// scene's own motion of it goes on without it. Whether there is such a thing now.
     pub fn lend(&mut self, what: Mover) -> bool {
         let lent = self.stage.lend(what);
         lent.unwrap_or_else(|e| {
@@ -258,7 +271,8 @@ impl Runner {
             self.incident(None, e.to_string());
         }
     }
-    /// It goes back to where the scene has it, smoothly and no faster than `speed` \[m/s\] beside what the scene moves it by.
+    /// It goes back to where the scene has it, smoothly and no faster than `speed` \[m/s\] beside what the scene moves
+    /// it by.
     pub fn give_back(&mut self, what: Mover, speed: f64) {
         if let Err(e) = self.stage.give_back(what, speed) {
             self.incident(None, e.to_string());
@@ -275,18 +289,28 @@ impl Runner {
         (self.late, self.finished) = (true, true);
     }
 
-    /// Pieces in which a frame, or what is left of it, is done: what moves is sampled at every substep, so that its path does not depend on the
-    /// frame rate, and a condition is judged after each.
+    /// Pieces in which a frame, or what is left of it, is done: what moves is sampled at every substep, so that its
+    /// path does not depend on the frame rate, and a condition is judged after each.
     fn pieces(&self, dt: f64) -> u32 {
         let substep = self.stage.world.settings().substep;
-        if self.stage.is_driven() || self.condition().is_some() { (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32 } else { 1 }
+        if self.stage.is_driven() || self.condition().is_some() {
+            (dt / substep - 1e-9).ceil().clamp(1.0, 10_000.0) as u32
+        } else {
+            1
+        }
     }
 
-    /// Steps the world through one frame, or the rest of it; its report, the solver's CPU time \[s\], and whether it was stuck. None where the work is spent before.
+    /// Steps the world through one frame, or the rest of it; its report, the solver's CPU time \[s\], and whether it
+    /// was stuck. None where the work is spent before.
     fn simulate(&mut self, drive: &mut dyn FnMut(&mut Recorder, f64)) -> Option<(FrameReport, f64, bool)> {
         let dt = 1.0 / self.scene.frame_rate;
         let begin = self.frame as f64 * dt;
-        let fresh = || UnderWay { report: FrameReport { converged: true, ..FrameReport::default() }, done: 0.0, cpu: Duration::ZERO, stuck: false };
+        let fresh = || UnderWay {
+            report: FrameReport { converged: true, ..FrameReport::default() },
+            done: 0.0,
+            cpu: Duration::ZERO,
+            stuck: false,
+        };
         let UnderWay { mut report, done: begun, mut cpu, mut stuck } = self.under_way.take().unwrap_or_else(fresh);
         let (before_call, work_before) = (cpu, self.stage.world.work_done());
         // Work of the piece before, in this call.
@@ -300,7 +324,8 @@ impl Runner {
             let begin_piece = done + rest * f64::from(k - 1) / f64::from(pieces);
             if let Some(most) = self.most_work {
                 let left = most - (self.stage.world.work_done() - work_before);
-                // Rather less than what would be thrown away. A piece that is begun may take half of all, for what it needs then is no chance.
+                // Rather less than what would be thrown away. A piece that is begun may take half of all, for what it
+                // needs then is no chance.
                 if left < last_piece && begin_piece > begun {
                     self.last_cpu = (cpu - before_call).as_secs_f64();
                     self.under_way = Some(UnderWay { report, done: begin_piece, cpu, stuck });
@@ -311,7 +336,10 @@ impl Runner {
                 self.allow(None);
             }
             // A frame that was begun before has less time left: what is led goes no faster for that.
-            drive(&mut self.stage.world, if k == pieces && begun <= 0.0 { 1.0 } else { (done - begun + rest * part) / dt });
+            drive(
+                &mut self.stage.world,
+                if k == pieces && begun <= 0.0 { 1.0 } else { (done - begun + rest * part) / dt },
+            );
             let moved = self.stage.drive(at);
             if let Err(e) = moved.and(self.stage.bring_back(at, piece)) {
                 self.incident(None, e.to_string());
@@ -380,7 +408,8 @@ impl Runner {
         }
     }
 
-    /// Judges the condition of the phase within a frame, after a piece of it \[s\]; whether the phase ended. `report` is of the frame so far.
+    /// Judges the condition of the phase within a frame, after a piece of it \[s\]; whether the phase ended. `report`
+    /// is of the frame so far.
     fn condition_ends_phase(&mut self, time: f64, piece: f64, report: &FrameReport) -> bool {
         let Some((_, at_least)) = self.condition() else { return false };
         if time - self.stage.phase_begin + 0.5 * piece <= at_least {
@@ -411,14 +440,21 @@ impl Runner {
     fn overlap(&mut self, o: &Overlap) -> String {
         let thread = |rod: Handle<Rod>| {
             let k = self.stage.threads.iter().position(|h| *h == rod);
-            k.map_or_else(|| (format!("thread {rod:?}"), None), |k| (self.scene.threads[k].name.clone(), Some(&self.scene.threads[k].location)))
+            k.map_or_else(
+                || (format!("thread {rod:?}"), None),
+                |k| (self.scene.threads[k].name.clone(), Some(&self.scene.threads[k].location)),
+            )
         };
         let shape = |shape: Handle<sutura::Shape>| {
             let k = self.stage.shapes.iter().position(|h| *h == shape);
-            k.map_or_else(|| (format!("shape {shape:?}"), None), |k| (self.scene.shapes[k].name.clone(), Some(&self.scene.shapes[k].location)))
+            k.map_or_else(
+                || (format!("shape {shape:?}"), None),
+                |k| (self.scene.shapes[k].name.clone(), Some(&self.scene.shapes[k].location)),
+            )
         };
         let mm = |v: f64| format!("{:.3}", 1e3 * v + 0.0);
-        let (name, mut places) = (thread(o.rod).0, thread(o.rod).1.map(ToString::to_string).into_iter().collect::<Vec<_>>());
+        let (name, mut places) =
+            (thread(o.rod).0, thread(o.rod).1.map(ToString::to_string).into_iter().collect::<Vec<_>>());
         let (with, with_arc) = match o.with {
             OverlapWith::Rod { rod, arc } => (thread(rod), Some(arc)),
             OverlapWith::Shape(handle) => (shape(handle), None),
@@ -528,7 +564,9 @@ impl Runner {
                 continue;
             }
             let element = (0..rod.n_elements()).max_by(|a, b| rod.tension(*a).total_cmp(&rod.tension(*b)));
-            let Some((element, tension)) = element.map(|j| (j, rod.tension(j))).filter(|e| e.1 > strength.value) else { continue };
+            let Some((element, tension)) = element.map(|j| (j, rod.tension(j))).filter(|e| e.1 > strength.value) else {
+                continue;
+            };
             let (time_s, arc_m) = (self.stage.time, rod.arc(element) + 0.5 * rod.rest_lengths()[element]);
             let message = format!(
                 "`{}`: the tension passes the knot-pull strength of {} N ({}): {tension:.3} N at {:.2} mm; a thread with a knot may break there, here it does not",
@@ -537,7 +575,14 @@ impl Runner {
                 strength.of,
                 1e3 * arc_m
             );
-            self.warnings.push(WarningReport { message, thread: def.name.clone(), time_s, arc_m, tension_n: tension, strength_n: strength.value });
+            self.warnings.push(WarningReport {
+                message,
+                thread: def.name.clone(),
+                time_s,
+                arc_m,
+                tension_n: tension,
+                strength_n: strength.value,
+            });
         }
     }
 
@@ -555,7 +600,8 @@ impl Runner {
     }
 
     fn read_profiles(&mut self, due: impl Fn(Moment) -> bool) {
-        let (now, later): (Vec<usize>, Vec<usize>) = self.profiles_open.iter().partition(|i| due(self.scene.profiles[**i].moment));
+        let (now, later): (Vec<usize>, Vec<usize>) =
+            self.profiles_open.iter().partition(|i| due(self.scene.profiles[**i].moment));
         self.profiles_open = later;
         for i in now {
             self.profiles.push(profile(&self.scene.profiles[i], &self.stage));
@@ -576,7 +622,14 @@ impl Runner {
             self.stage.apply(step)?;
         }
         let time = self.stage.time;
-        self.phases.push(PhaseReport { name: phase.name.clone(), start_s: time, end_s: time, ended_by: String::new(), knots: Vec::new(), still: phase.still });
+        self.phases.push(PhaseReport {
+            name: phase.name.clone(),
+            start_s: time,
+            end_s: time,
+            ended_by: String::new(),
+            knots: Vec::new(),
+            still: phase.still,
+        });
         Ok(())
     }
 
@@ -595,8 +648,8 @@ impl Runner {
 
     fn end_phase_when_due(&mut self) {
         let Some(phase) = self.scene.phases.get(self.phase) else { return };
-        // Times are whole frames; rounding must not cost or add one. After a phase that ended within a frame it goes up, so that motions come to
-        // their ends.
+        // Times are whole frames; rounding must not cost or add one. After a phase that ended within a frame it goes
+        // up, so that motions come to their ends.
         let (time, frame) = (self.stage.time - self.stage.phase_begin, 1.0 / self.scene.frame_rate);
         let slack = if self.phase_within { 1e-6 * frame } else { 0.5 * frame };
         let ended = match &phase.end {
@@ -607,7 +660,8 @@ impl Runner {
                     None => self.stage.is_done(),
                 };
                 // As it is judged after the other substeps.
-                let slack = if condition.is_some() { 0.5 * self.stage.world.settings().substep.min(frame) } else { slack };
+                let slack =
+                    if condition.is_some() { 0.5 * self.stage.world.settings().substep.min(frame) } else { slack };
                 if holds && time + slack > *at_least {
                     Some(if condition.is_some() { "condition" } else { "motions done" })
                 } else if time + slack > *at_most {
@@ -662,7 +716,10 @@ impl Runner {
         let phase = &self.scene.phases[self.phase.min(self.scene.phases.len() - 1)];
         Progress {
             frame: self.frame,
-            time: self.under_way.as_ref().map_or(self.stage.time, |u| self.frame as f64 / self.scene.frame_rate + u.done),
+            time: self
+                .under_way
+                .as_ref()
+                .map_or(self.stage.time, |u| self.frame as f64 / self.scene.frame_rate + u.done),
             fraction: if self.finished { 1.0 } else { (done + here) / total },
             phase: phase.name.clone(),
             ms: self.last_cpu * 1e3,
@@ -676,14 +733,19 @@ impl Runner {
         let mut failures = Vec::new();
         let through = self.overlaps.iter().filter(|o| o.through).count();
         if through > 0 {
-            failures.push(format!("threads were put through each other or into shapes at {through} place{}", if through == 1 { "" } else { "s" }));
+            failures.push(format!(
+                "threads were put through each other or into shapes at {through} place{}",
+                if through == 1 { "" } else { "s" }
+            ));
         } else if !self.overlaps.is_empty() && !self.stage.world.overlaps().is_empty() {
             failures.push("what was put into each other lies in each other still".into());
         }
         let total = self.stage.time;
         if self.missed > MOST_MISSED * total {
             let simulated = (total - self.missed).max(0.0);
-            failures.push(format!("of {total:.4} s only {simulated:.4} s were simulated: no acceptable substep was found for the rest"));
+            failures.push(format!(
+                "of {total:.4} s only {simulated:.4} s were simulated: no acceptable substep was found for the rest"
+            ));
         }
         failures
     }
@@ -769,7 +831,12 @@ impl Runner {
             version: env!("CARGO_PKG_VERSION").into(),
             frame_rate: self.scene.frame_rate,
             threads: self.scene.threads.iter().zip(self.stage.rods()).map(thread).collect(),
-            shapes: self.scene.shapes.iter().map(|s| Shape { name: s.name.clone(), outline: ShapeOutline::from(&s.spec.geometry) }).collect(),
+            shapes: self
+                .scene
+                .shapes
+                .iter()
+                .map(|s| Shape { name: s.name.clone(), outline: ShapeOutline::from(&s.spec.geometry) })
+                .collect(),
             grips: self.scene.grips.clone(),
         }
     }
@@ -797,15 +864,25 @@ impl Runner {
         // Things of the scene alone are in its world, so each has its number.
         let thread = |slot: usize| stage.threads.iter().position(|h| h.index() == slot).map(|i| i as u32);
         let shape = |slot: usize| stage.shapes.iter().position(|h| h.index() == slot).map(|i| i as u32);
-        let on = |slot: usize, element: usize, s: f64| Some(OnThread { thread: thread(slot)?, element: element as u32, s: s as f32 });
+        let on = |slot: usize, element: usize, s: f64| {
+            Some(OnThread { thread: thread(slot)?, element: element as u32, s: s as f32 })
+        };
         let contact = |c: sutura::ContactView| {
             let with = match c.b {
                 ContactWith::Thread(slot, element, s) => Touched::Thread(on(slot, element, s)?),
                 ContactWith::Shape(slot) => Touched::Shape(shape(slot)?),
             };
-            Some(Contact { on: on(c.a.0, c.a.1, c.s)?, with, point: v(c.point), normal: v(c.normal), force: v(c.force), sliding: c.sliding })
+            Some(Contact {
+                on: on(c.a.0, c.a.1, c.s)?,
+                with,
+                point: v(c.point),
+                normal: v(c.normal),
+                force: v(c.force),
+                sliding: c.sliding,
+            })
         };
-        let grip = |i: usize| stage.grip(i).and_then(|h| stage.world.grip_wrench(h).ok()).map_or([0.0; 3], |w| v(w.force));
+        let grip =
+            |i: usize| stage.grip(i).and_then(|h| stage.world.grip_wrench(h).ok()).map_or([0.0; 3], |w| v(w.force));
         Forces {
             tensions: stage.rods().map(|r| (0..r.n_elements()).map(|e| r.tension(e) as f32).collect()).collect(),
             grips: (0..self.scene.grips.len()).map(grip).collect(),
@@ -838,10 +915,19 @@ impl Runner {
         let failures = self.failures();
         let passages = {
             let thread = |slot: usize| {
-                self.stage.threads.iter().position(|h| h.index() == slot).map_or(format!("thread {slot}"), |i| self.scene.threads[i].name.clone())
+                self.stage
+                    .threads
+                    .iter()
+                    .position(|h| h.index() == slot)
+                    .map_or(format!("thread {slot}"), |i| self.scene.threads[i].name.clone())
             };
-            let shape =
-                |slot: usize| self.stage.shapes.iter().position(|h| h.index() == slot).map_or(format!("shape {slot}"), |i| self.scene.shapes[i].name.clone());
+            let shape = |slot: usize| {
+                self.stage
+                    .shapes
+                    .iter()
+                    .position(|h| h.index() == slot)
+                    .map_or(format!("shape {slot}"), |i| self.scene.shapes[i].name.clone())
+            };
             self.stage.judge.passages(thread, shape, self.world_start)
         };
         let checks: Vec<_> = self.checks.into_iter().map(Check::finish).collect();
@@ -881,7 +967,13 @@ impl Runner {
             work: self.work,
             phases: self.phases,
         };
-        Outcome { report, series, trajectory: self.trajectory, saved: self.saved, input: self.stage.world.take_recording() }
+        Outcome {
+            report,
+            series,
+            trajectory: self.trajectory,
+            saved: self.saved,
+            input: self.stage.world.take_recording(),
+        }
     }
 
     fn thread_reports(&self) -> Vec<ThreadReport> {

@@ -15,8 +15,9 @@ pub struct Sample {
 
 /// All sample scenes.
 pub fn samples() -> &'static [Sample] {
-    static SAMPLES: LazyLock<Vec<Sample>> =
-        LazyLock::new(|| TEXTS.iter().map(|(name, text)| Sample { name, title: title(text).unwrap_or(name), text }).collect());
+    static SAMPLES: LazyLock<Vec<Sample>> = LazyLock::new(|| {
+        TEXTS.iter().map(|(name, text)| Sample { name, title: title(text).unwrap_or(name), text }).collect()
+    });
     &SAMPLES
 }
 
@@ -36,7 +37,8 @@ mod tests {
     fn every_sample_reads_and_says_what_it_shows() {
         assert!(samples().len() >= 8);
         for sample in samples() {
-            let scene = crate::Scene::parse(sample.text, &format!("{}.toml", sample.name)).unwrap_or_else(|e| panic!("{e}"));
+            let scene =
+                crate::Scene::parse(sample.text, &format!("{}.toml", sample.name)).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(sample.title, scene.title());
             assert!(!scene.description().is_empty(), "{}", sample.name);
         }

@@ -1,7 +1,7 @@
 //! Saved states: a file from which another scene with the same threads and shapes can start.
 //!
-//! Beside the engine's snapshot it holds every taking, letting go, loading and unloading in order. Doing these again gives the same
-//! handles in a fresh world, which then takes the snapshot.
+//! Beside the engine's snapshot it holds every taking, letting go, loading and unloading in order. Doing these again
+//! gives the same handles in a fresh world, which then takes the snapshot.
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -91,9 +91,15 @@ impl From<SavedHold> for Hold {
 impl From<LoadKind> for SavedLoad {
     fn from(k: LoadKind) -> Self {
         match k {
-            LoadKind::Point { place, force, torque } => SavedLoad::Point { place: place.into(), force: force.to_array(), torque: torque.to_array() },
-            LoadKind::Uniform { force_per_length } => SavedLoad::Uniform { force_per_length: force_per_length.to_array() },
-            LoadKind::Mass { place, mass, inertia } => SavedLoad::Mass { place: place.into(), mass, inertia: inertia.to_array() },
+            LoadKind::Point { place, force, torque } => {
+                SavedLoad::Point { place: place.into(), force: force.to_array(), torque: torque.to_array() }
+            }
+            LoadKind::Uniform { force_per_length } => {
+                SavedLoad::Uniform { force_per_length: force_per_length.to_array() }
+            }
+            LoadKind::Mass { place, mass, inertia } => {
+                SavedLoad::Mass { place: place.into(), mass, inertia: inertia.to_array() }
+            }
         }
     }
 }
@@ -102,9 +108,13 @@ impl From<SavedLoad> for LoadKind {
     fn from(k: SavedLoad) -> Self {
         let v = DVec3::from_array;
         match k {
-            SavedLoad::Point { place, force, torque } => LoadKind::Point { place: place.into(), force: v(force), torque: v(torque) },
+            SavedLoad::Point { place, force, torque } => {
+                LoadKind::Point { place: place.into(), force: v(force), torque: v(torque) }
+            }
             SavedLoad::Uniform { force_per_length } => LoadKind::Uniform { force_per_length: v(force_per_length) },
-            SavedLoad::Mass { place, mass, inertia } => LoadKind::Mass { place: place.into(), mass, inertia: v(inertia) },
+            SavedLoad::Mass { place, mass, inertia } => {
+                LoadKind::Mass { place: place.into(), mass, inertia: v(inertia) }
+            }
         }
     }
 }
@@ -143,7 +153,12 @@ impl SavedFile {
         }
         match word(8) {
             Some(VERSION) => {}
-            other => return Err(format!("saved state of version {}, this program reads version {VERSION}", other.unwrap_or(0))),
+            other => {
+                return Err(format!(
+                    "saved state of version {}, this program reads version {VERSION}",
+                    other.unwrap_or(0)
+                ));
+            }
         }
         let (body, sum) = bytes.split_at(bytes.len() - 4);
         if sum != crc32fast::hash(body).to_le_bytes() {
@@ -181,7 +196,12 @@ mod tests {
     fn a_saved_state_reads_back_and_damage_is_noticed() {
         let file = SavedFile {
             events: vec![
-                Event::Take { grip: "left".into(), thread: "silk".into(), place: Place::Arc(0.1).into(), hold: Hold::Jaw.into() },
+                Event::Take {
+                    grip: "left".into(),
+                    thread: "silk".into(),
+                    place: Place::Arc(0.1).into(),
+                    hold: Hold::Jaw.into(),
+                },
                 Event::LetGo { grip: "left".into() },
             ],
             snapshot: vec![1, 2, 3],

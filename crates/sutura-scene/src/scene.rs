@@ -7,7 +7,9 @@ use crate::motion::Plan;
 use crate::units::Unit;
 use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
-use sutura::{Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch, WeldRest};
+use sutura::{
+    Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch, WeldRest,
+};
 
 /// Most frames of a run: two days at 60 a second. What is recorded and probed is kept in memory.
 pub(crate) const MOST_FRAMES: f64 = 1e7;
@@ -337,15 +339,17 @@ impl Scene {
     }
     /// The same with some of its values set from outside, see [`Scene::parse_with`].
     pub fn load_with(path: &Path, settings: &[(String, String)]) -> Result<Scene, SceneError> {
-        let text = std::fs::read_to_string(path).map_err(|e| SceneError::of_file(path.display().to_string(), e.to_string()))?;
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| SceneError::of_file(path.display().to_string(), e.to_string()))?;
         Self::parse_with(&text, &path.display().to_string(), settings)
     }
     /// Reads the text of a scene; `file_name` stands in messages, and its folder is where paths start.
     pub fn parse(text: &str, file_name: &str) -> Result<Scene, SceneError> {
         Self::parse_with(text, file_name, &[])
     }
-    /// The same with some of its values set from outside, in order: the path of a key (`solver.substep`, `thread.NAME.elements`,
-    /// `phase.NAME.action[0].force`) and its value, which is read as TOML and, where it is none (`2 mm`), as a text.
+    /// The same with some of its values set from outside, in order: the path of a key (`solver.substep`,
+    /// `thread.NAME.elements`, `phase.NAME.action[0].force`) and its value, which is read as TOML and, where it is none
+    /// (`2 mm`), as a text.
     pub fn parse_with(text: &str, file_name: &str, settings: &[(String, String)]) -> Result<Scene, SceneError> {
         crate::load::scene(text, file_name, settings)
     }
@@ -365,12 +369,13 @@ impl Scene {
     pub fn frame_rate(&self) -> f64 {
         self.frame_rate
     }
-    /// Longest simulated time that it can take \[s\], as far as it is known beforehand; shorter when conditions end phases early.
+    /// Longest simulated time that it can take \[s\], as far as it is known beforehand; shorter when conditions end
+    /// phases early.
     pub fn duration(&self) -> Option<f64> {
         Some(self.phases.iter().map(Phase::longest).sum())
     }
-    /// Times of which stills are wanted \[s\]; times beyond the end mean the end. Phases may ask for one at their end, which the
-    /// report marks.
+    /// Times of which stills are wanted \[s\]; times beyond the end mean the end. Phases may ask for one at their end,
+    /// which the report marks.
     pub fn stills(&self) -> &[f64] {
         &self.stills
     }

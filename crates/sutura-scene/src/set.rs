@@ -12,7 +12,8 @@ use toml::de::{DeArray, DeTable, DeValue};
 pub struct Setting {
     pub path: String,
     pub value: String,
-    /// The value as a document of its own, behind as many blanks as there is text before it, so that its spans lie behind the text.
+    /// The value as a document of its own, behind as many blanks as there is text before it, so that its spans lie
+    /// behind the text.
     document: String,
 }
 
@@ -31,7 +32,16 @@ impl Setting {
         format!("{} = {}", self.path, self.value)
     }
     fn error(&self, message: String, help: Option<String>) -> SceneError {
-        SceneError { problems: vec![Problem { file: self.source(), line: None, column: None, key: String::new(), message, help }] }
+        SceneError {
+            problems: vec![Problem {
+                file: self.source(),
+                line: None,
+                column: None,
+                key: String::new(),
+                message,
+                help,
+            }],
+        }
     }
     /// A TOML value; whatever is none, such as `2 mm`, is a text.
     fn parsed(&self) -> Spanned<DeValue<'_>> {
@@ -48,13 +58,19 @@ impl Setting {
         for part in self.path.split('.') {
             let (name, numbers) = part.split_once('[').map_or((part, None), |(name, rest)| (name, Some(rest)));
             if name.is_empty() {
-                return Err(self.error("a path is names with points between them, such as thread.NAME.elements".into(), None));
+                return Err(
+                    self.error("a path is names with points between them, such as thread.NAME.elements".into(), None)
+                );
             }
             steps.push(Step::Name(name));
             for number in numbers.iter().flat_map(|n| n.split('[')) {
                 match number.strip_suffix(']').and_then(|n| n.parse().ok()) {
                     Some(n) => steps.push(Step::Number(n)),
-                    None => return Err(self.error(format!("`[{number}` is not the number of an entry, such as `[0]`"), None)),
+                    None => {
+                        return Err(
+                            self.error(format!("`[{number}` is not the number of an entry, such as `[0]`"), None)
+                        );
+                    }
                 }
             }
         }
@@ -68,8 +84,12 @@ impl Setting {
             node = match (node.get_mut(), step) {
                 (DeValue::Table(table), Step::Name(name)) => self.child(table, name),
                 (DeValue::Array(items), step) => self.entry(items, step)?,
-                (_, Step::Number(n)) => return Err(self.error(format!("there is no array from which to take entry {n}"), None)),
-                (_, Step::Name(name)) => return Err(self.error(format!("there is no table in which to set `{name}`"), None)),
+                (_, Step::Number(n)) => {
+                    return Err(self.error(format!("there is no array from which to take entry {n}"), None));
+                }
+                (_, Step::Name(name)) => {
+                    return Err(self.error(format!("there is no table in which to set `{name}`"), None));
+                }
             };
             steps = rest;
         }
@@ -77,10 +97,16 @@ impl Setting {
     /// The value of a key; a key that is not there begins as an empty table.
     fn child<'a, 'd>(&'d self, table: &'a mut DeTable<'d>, name: &'d str) -> &'a mut Spanned<DeValue<'d>> {
         let at = self.end()..self.end();
-        table.entry(Spanned::new(at.clone(), name.into())).or_insert_with(|| Spanned::new(at, DeValue::Table(DeTable::new())))
+        table
+            .entry(Spanned::new(at.clone(), name.into()))
+            .or_insert_with(|| Spanned::new(at, DeValue::Table(DeTable::new())))
     }
     /// An entry of an array, by number or name.
-    fn entry<'a, 'd>(&self, items: &'a mut DeArray<'d>, step: &Step<'_>) -> Result<&'a mut Spanned<DeValue<'d>>, SceneError> {
+    fn entry<'a, 'd>(
+        &self,
+        items: &'a mut DeArray<'d>,
+        step: &Step<'_>,
+    ) -> Result<&'a mut Spanned<DeValue<'d>>, SceneError> {
         let names: Vec<String> = items.iter().map(|item| name_of(item.get_ref()).unwrap_or_default()).collect();
         let found = match step {
             Step::Number(n) => Some(*n).filter(|n| *n < items.len()),
@@ -89,10 +115,15 @@ impl Setting {
         match found {
             Some(i) => Ok(&mut items.as_mut()[i]),
             None => Err(match step {
-                Step::Number(n) => self.error(format!("there is no entry {n}: there are {}, counted from 0", items.len()), None),
+                Step::Number(n) => {
+                    self.error(format!("there is no entry {n}: there are {}, counted from 0", items.len()), None)
+                }
                 Step::Name(name) => {
                     let known = names.iter().map(String::as_str).filter(|n| !n.is_empty());
-                    self.error(format!("no entry is called `{name}`; entries without a name are chosen by number, `[0]`"), suggest(name, known))
+                    self.error(
+                        format!("no entry is called `{name}`; entries without a name are chosen by number, `[0]`"),
+                        suggest(name, known),
+                    )
                 }
             }),
         }

@@ -15,7 +15,8 @@ use sutura::input::Recorder;
 use sutura::knot::Entries;
 use sutura::math::{exp, log};
 use sutura::{
-    Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
+    Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView,
+    Shape, ShapeMotion, StepReport, WeldSpec,
 };
 
 /// A grip that holds.
@@ -174,7 +175,8 @@ struct Names {
 }
 
 impl Stage {
-    /// Builds the world of a scene (which records what is done to it, if it is to), takes up a saved state, and applies what stands at the beginning.
+    /// Builds the world of a scene (which records what is done to it, if it is to), takes up a saved state, and applies
+    /// what stands at the beginning.
     pub fn new(scene: &Scene, record: bool) -> Result<Stage, SceneError> {
         let at = |location: &Location, e: Error| location.error(e.to_string());
         let mut world = Recorder::new(scene.settings.clone(), record).map_err(|e| at(&scene.solver_location, e))?;
@@ -208,7 +210,11 @@ impl Stage {
             let spec = ReelSpec { rod: threads[reel.thread], at_end: reel.at_end, law: reel.law, supply: reel.supply };
             reels.push(world.insert_reel(&spec).map_err(|e| at(&reel.location, e))?);
         }
-        let names = Names { threads: scene.threads.iter().map(|t| t.name.clone()).collect(), grips: scene.grips.clone(), loads: scene.loads.clone() };
+        let names = Names {
+            threads: scene.threads.iter().map(|t| t.name.clone()).collect(),
+            grips: scene.grips.clone(),
+            loads: scene.loads.clone(),
+        };
         let mut stage = Stage {
             marks: vec![None; threads.len()],
             world,
@@ -244,7 +250,9 @@ impl Stage {
 
     /// Does a saved scene's takings and loadings again, then takes its snapshot.
     fn take_up(&mut self, saved: &SavedFile) -> Result<(), String> {
-        let find = |list: &[String], name: &str| list.iter().position(|n| n == name).ok_or(format!("it knows `{name}`, this scene does not"));
+        let find = |list: &[String], name: &str| {
+            list.iter().position(|n| n == name).ok_or(format!("it knows `{name}`, this scene does not"))
+        };
         for event in &saved.events {
             match event {
                 Event::Take { grip, thread, place, hold } => {
@@ -308,7 +316,11 @@ impl Stage {
                     _ => scaled(kind, 0.0),
                 };
                 self.set_load(*load, *thread, from)?;
-                self.ramps.push(Ramp { begin: self.time, span: *ramp, what: Growing::Load { load: *load, from, to: *kind } });
+                self.ramps.push(Ramp {
+                    begin: self.time,
+                    span: *ramp,
+                    what: Growing::Load { load: *load, from, to: *kind },
+                });
                 Ok(())
             }
             Action::Unload { load } => {
@@ -323,12 +335,24 @@ impl Stage {
                 self.ramps.retain(|r| !matches!(r.what, Growing::Gravity { .. }));
                 let from = self.world.settings().gravity;
                 if *ramp > 0.0 {
-                    self.ramps.push(Ramp { begin: self.time, span: *ramp, what: Growing::Gravity { from, to: *value } });
+                    self.ramps.push(Ramp {
+                        begin: self.time,
+                        span: *ramp,
+                        what: Growing::Gravity { from, to: *value },
+                    });
                     return Ok(());
                 }
                 self.set_gravity(*value)
             }
-            Action::Solver { linear_damping, angular_damping, linear_drag, angular_drag, substep, newton_max, tolerance } => {
+            Action::Solver {
+                linear_damping,
+                angular_damping,
+                linear_drag,
+                angular_drag,
+                substep,
+                newton_max,
+                tolerance,
+            } => {
                 let mut s = self.world.settings().clone();
                 s.linear_damping = linear_damping.unwrap_or(s.linear_damping);
                 s.angular_damping = angular_damping.unwrap_or(s.angular_damping);
@@ -354,7 +378,8 @@ impl Stage {
         if self.grips[grip].is_some() {
             self.let_go(grip)?;
         }
-        let handle = self.world.insert_grip(&GripSpec { rod: self.threads[thread], place, hold, drive: Drive::Pose, ramp })?;
+        let handle =
+            self.world.insert_grip(&GripSpec { rod: self.threads[thread], place, hold, drive: Drive::Pose, ramp })?;
         let taken = self.world.grip_pose(handle)?;
         self.grips[grip] = Some(Held { handle, thread, place, taken });
         let (grip, thread) = (self.names.grips[grip].clone(), self.names.threads[thread].clone());
@@ -384,7 +409,8 @@ impl Stage {
         }
         // Only the last value counts for a saved state.
         let name = &self.names.loads[load];
-        let event = Event::Load { load: name.clone(), thread: self.names.threads[thread].clone(), kind: to_kind(kind).into() };
+        let event =
+            Event::Load { load: name.clone(), thread: self.names.threads[thread].clone(), kind: to_kind(kind).into() };
         match self.events.last_mut() {
             Some(Event::Load { load, kind: last, .. }) if load == name => *last = to_kind(kind).into(),
             _ => self.events.push(event),
@@ -408,7 +434,8 @@ impl Stage {
 
     // ---- motion ----
 
-    /// The scene wants a thing to be moved this way from here on. What another hand holds it only remembers; what that hand has left it takes back.
+    /// The scene wants a thing to be moved this way from here on. What another hand holds it only remembers; what that
+    /// hand has left it takes back.
     fn set_way(&mut self, what: Mover, way: Way) -> Result<(), Error> {
         let now = self.pose_of(what);
         if let Some(lent) = self.lent.iter_mut().find(|l| l.what == what) {
@@ -444,7 +471,9 @@ impl Stage {
         Some(match what {
             Mover::Grip(i) => match self.world.grip_drive(self.grips[i]?.handle).ok()? {
                 Drive::Pose => Way::Posed,
-                Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
+                Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => {
+                    Way::Pushed(direction, force, speed_limit)
+                }
             },
             Mover::Shape(i) => match self.world.shape(self.shapes[i]).ok()?.motion {
                 ShapeMotion::Fixed => Way::Fixed,
@@ -470,10 +499,12 @@ impl Stage {
         lent.state = LentState::Left;
         self.put_way(what, Way::Posed)
     }
-    /// It goes back to where the scene has it, no faster than `speed` \[m/s\] beside what the scene moves it by; what the scene pushes by a force is
-    /// pushed at once.
+    /// It goes back to where the scene has it, no faster than `speed` \[m/s\] beside what the scene moves it by; what
+    /// the scene pushes by a force is pushed at once.
     pub fn give_back(&mut self, what: Mover, speed: f64) -> Result<(), Error> {
-        let (Some(k), Some(now)) = (self.lent.iter().position(|l| l.what == what), self.pose_of(what)) else { return Ok(()) };
+        let (Some(k), Some(now)) = (self.lent.iter().position(|l| l.what == what), self.pose_of(what)) else {
+            return Ok(());
+        };
         let way = self.lent[k].way;
         if matches!(way, Way::Pushed(..)) {
             self.lent.remove(k);
@@ -482,7 +513,8 @@ impl Stage {
         let wanted = self.wanted(&self.lent[k], self.time);
         let turn = now.orientation * wanted.orientation.conjugate();
         let off = Pose::new(now.position - wanted.position, if turn.w < 0.0 { -turn } else { turn });
-        let span = QUINTIC_SLOPE * (off.position.length() / speed.max(1e-6)).max(log(off.orientation).length() / BACK_TURN);
+        let span =
+            QUINTIC_SLOPE * (off.position.length() / speed.max(1e-6)).max(log(off.orientation).length() / BACK_TURN);
         self.lent[k].state = LentState::Back { off, span, passed: 0.0 };
         self.put_way(what, Way::Posed)
     }
@@ -501,7 +533,8 @@ impl Stage {
             Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
         }
     }
-    /// Takes back a part of the time for which things were last brought back: the step ended early, and that part did not pass.
+    /// Takes back a part of the time for which things were last brought back: the step ended early, and that part did
+    /// not pass.
     pub fn not_passed(&mut self, dt: f64) {
         for l in &mut self.lent {
             if let LentState::Back { passed, .. } = &mut l.state {
@@ -602,16 +635,27 @@ impl Stage {
     /// Recognizes the knot of a thread as it is now.
     pub fn knot(&self, thread: usize) -> KnotReport {
         // Nothing panics while it is locked.
-        let known = |knots: &mut Vec<(usize, KnotReport)>| knots.iter().find(|(t, _)| *t == thread).map(|(_, knot)| knot.clone());
+        let known = |knots: &mut Vec<(usize, KnotReport)>| {
+            knots.iter().find(|(t, _)| *t == thread).map(|(_, knot)| knot.clone())
+        };
         if let Some(knot) = self.knots.lock().ok().and_then(|mut knots| known(&mut knots)) {
             return knot;
         }
         let knot = match self.rod(thread) {
             Some(rod) => {
-                let held: Vec<f64> = self.grips.iter().flatten().filter(|h| h.thread == thread).map(|h| arc_of(&rod, h.place)).collect();
+                let held: Vec<f64> =
+                    self.grips.iter().flatten().filter(|h| h.thread == thread).map(|h| arc_of(&rod, h.place)).collect();
                 judge::recognize(&rod, &held, self.seed)
             }
-            None => KnotReport { knot: "unknown".into(), certain: false, determinant: 0, signature: 0, tried: 0, agreed: 0, form: None },
+            None => KnotReport {
+                knot: "unknown".into(),
+                certain: false,
+                determinant: 0,
+                signature: 0,
+                tried: 0,
+                agreed: 0,
+                form: None,
+            },
         };
         if let Ok(mut knots) = self.knots.lock() {
             knots.push((thread, knot.clone()));
@@ -652,15 +696,21 @@ impl Stage {
     /// A number of one element, or its greatest magnitude over a whole thread.
     fn at_element(&self, args: &[Ref], of: impl Fn(&RodView<'_>, usize) -> f64) -> f64 {
         match args.first() {
-            Some(Ref::Thread(t)) => self.rod(*t).map_or(f64::NAN, |r| (0..r.n_elements()).map(|j| of(&r, j)).fold(f64::NEG_INFINITY, f64::max)),
+            Some(Ref::Thread(t)) => self
+                .rod(*t)
+                .map_or(f64::NAN, |r| (0..r.n_elements()).map(|j| of(&r, j)).fold(f64::NEG_INFINITY, f64::max)),
             Some(r) => self.on_thread(*r).map_or(f64::NAN, |(rod, place)| of(&rod, element_of(&rod, place))),
             None => f64::NAN,
         }
     }
     fn at_joint(&self, args: &[Ref], of: impl Fn(&RodView<'_>, usize) -> f64) -> f64 {
         match args.first() {
-            Some(Ref::Thread(t)) => self.rod(*t).map_or(f64::NAN, |r| (0..r.n_elements().saturating_sub(1)).map(|j| of(&r, j)).fold(0.0, f64::max)),
-            Some(r) => self.on_thread(*r).and_then(|(rod, place)| Some(of(&rod, joint_of(&rod, place)?))).unwrap_or(f64::NAN),
+            Some(Ref::Thread(t)) => self
+                .rod(*t)
+                .map_or(f64::NAN, |r| (0..r.n_elements().saturating_sub(1)).map(|j| of(&r, j)).fold(0.0, f64::max)),
+            Some(r) => {
+                self.on_thread(*r).and_then(|(rod, place)| Some(of(&rod, joint_of(&rod, place)?))).unwrap_or(f64::NAN)
+            }
             None => f64::NAN,
         }
     }
@@ -689,11 +739,18 @@ impl Stage {
     fn gap(&self, a: usize, b: Ref) -> f64 {
         let Some(rod) = self.rod(a) else { return f64::NAN };
         match b {
-            Ref::Shape(s) => self.world.shape(self.shapes[s]).map_or(f64::NAN, |s| distance::thread_shape(rod.positions(), rod.radius(), s.geometry, &s.pose)),
-            Ref::Thread(t) if t != a => {
-                self.rod(t).map_or(f64::NAN, |other| distance::threads((rod.positions(), rod.radius()), (other.positions(), other.radius()), None))
-            }
-            _ => distance::threads((rod.positions(), rod.radius()), (rod.positions(), rod.radius()), Some(rod.rest_lengths())),
+            Ref::Shape(s) => self
+                .world
+                .shape(self.shapes[s])
+                .map_or(f64::NAN, |s| distance::thread_shape(rod.positions(), rod.radius(), s.geometry, &s.pose)),
+            Ref::Thread(t) if t != a => self.rod(t).map_or(f64::NAN, |other| {
+                distance::threads((rod.positions(), rod.radius()), (other.positions(), other.radius()), None)
+            }),
+            _ => distance::threads(
+                (rod.positions(), rod.radius()),
+                (rod.positions(), rod.radius()),
+                Some(rod.rest_lengths()),
+            ),
         }
     }
     fn is_moving(&self, what: Mover) -> bool {
@@ -794,7 +851,8 @@ fn from_kind(kind: LoadKind) -> LoadDef {
 /// Whether one load may grow into another: the same kind at the same place.
 fn same_kind(a: &LoadDef, b: &LoadDef) -> bool {
     match (a, b) {
-        (LoadDef::Point { place: p, .. }, LoadDef::Point { place: q, .. }) | (LoadDef::Mass { place: p, .. }, LoadDef::Mass { place: q, .. }) => p == q,
+        (LoadDef::Point { place: p, .. }, LoadDef::Point { place: q, .. })
+        | (LoadDef::Mass { place: p, .. }, LoadDef::Mass { place: q, .. }) => p == q,
         (LoadDef::Uniform { .. }, LoadDef::Uniform { .. }) => true,
         _ => false,
     }
@@ -834,20 +892,26 @@ impl Live for Stage {
             Some(Ref::Thread(t)) => Some(t),
             _ => None,
         };
-        let of_thread = |f: &dyn Fn(&RodView<'_>) -> f64| Value::Number(thread.and_then(|t| self.rod(t)).map_or(f64::NAN, |r| f(&r)));
+        let of_thread = |f: &dyn Fn(&RodView<'_>) -> f64| {
+            Value::Number(thread.and_then(|t| self.rod(t)).map_or(f64::NAN, |r| f(&r)))
+        };
         let place = first.unwrap_or(Ref::Thread(0));
         match read {
             Read::Time => Value::Number(self.time),
             Read::PhaseTime => Value::Number(self.time - self.phase_begin),
             Read::Position => Value::Vector(self.position(place)),
-            Read::Velocity => Value::Vector(self.on_thread(place).map_or(DVec3::NAN, |(rod, p)| along(&rod, rod.velocities(), p))),
+            Read::Velocity => {
+                Value::Vector(self.on_thread(place).map_or(DVec3::NAN, |(rod, p)| along(&rod, rod.velocities(), p)))
+            }
             Read::D1 => Value::Vector(self.orientation(place) * DVec3::X),
             Read::D2 => Value::Vector(self.orientation(place) * DVec3::Y),
             Read::D3 => Value::Vector(self.orientation(place) * DVec3::Z),
             Read::Orientation => Value::Columns(self.orientation(place).to_array().to_vec()),
             Read::Tension => Value::Number(self.at_element(args, |r, j| r.internal_force(j).z)),
             Read::Shear => Value::Number(self.at_element(args, |r, j| r.internal_force(j).truncate().length())),
-            Read::Moment => Value::Vector(self.on_thread(place).and_then(|(rod, p)| Some(rod.moment(joint_of(&rod, p)?))).unwrap_or(DVec3::NAN)),
+            Read::Moment => Value::Vector(
+                self.on_thread(place).and_then(|(rod, p)| Some(rod.moment(joint_of(&rod, p)?))).unwrap_or(DVec3::NAN),
+            ),
             Read::Bending => Value::Number(self.at_joint(args, |r, j| r.moment(j).truncate().length())),
             Read::Torsion => Value::Number(match thread {
                 Some(_) => self.at_joint(args, |r, j| r.moment(j).z.abs()),
@@ -861,7 +925,9 @@ impl Live for Stage {
                 let w = self.wrench(place);
                 Value::Columns(w.force.to_array().into_iter().chain(w.torque.to_array()).collect())
             }
-            Read::Distance => Value::Number(args.get(1).map_or(f64::NAN, |b| self.position(place).distance(self.position(*b)))),
+            Read::Distance => {
+                Value::Number(args.get(1).map_or(f64::NAN, |b| self.position(place).distance(self.position(*b))))
+            }
             Read::Gap => Value::Number(thread.map_or(f64::NAN, |t| self.gap(t, args.get(1).copied().unwrap_or(place)))),
             // Nothing near is far away.
             Read::Clearance => Value::Number(self.last.clearance().unwrap_or(f64::INFINITY)),
@@ -886,7 +952,9 @@ impl Live for Stage {
                 match first {
                     None => Value::Number(self.rods().map(|r| fastest(&r)).fold(0.0, f64::max)),
                     Some(Ref::Thread(_)) => of_thread(&fastest),
-                    Some(r) => Value::Number(self.on_thread(r).map_or(f64::NAN, |(rod, p)| along(&rod, rod.velocities(), p).length())),
+                    Some(r) => Value::Number(
+                        self.on_thread(r).map_or(f64::NAN, |(rod, p)| along(&rod, rod.velocities(), p).length()),
+                    ),
                 }
             }
             Read::Momentum => Value::Vector(match thread {
@@ -911,9 +979,13 @@ impl Live for Stage {
                 let [a, b] = e.and_then(|e| e.loop_ab).unwrap_or([f64::NAN; 2]);
                 Value::Columns(vec![e.map_or(f64::NAN, |e| e.tail_a), a, b, e.map_or(f64::NAN, |e| e.tail_b)])
             }
-            Read::LoopTension => Value::Number(thread.and_then(|t| judge::loop_tension(&self.rod(t)?)).unwrap_or(f64::NAN)),
+            Read::LoopTension => {
+                Value::Number(thread.and_then(|t| judge::loop_tension(&self.rod(t)?)).unwrap_or(f64::NAN))
+            }
             Read::Slip => Value::Number(
-                thread.and_then(|t| Some((self.marks[t]?, judge::entries(&self.rod(t)?)?))).map_or(f64::NAN, |(before, now)| now.slip_since(&before)),
+                thread
+                    .and_then(|t| Some((self.marks[t]?, judge::entries(&self.rod(t)?)?)))
+                    .map_or(f64::NAN, |(before, now)| now.slip_since(&before)),
             ),
             Read::PassesThrough => Value::Truth(self.judge.passes_through() == Some(true)),
         }

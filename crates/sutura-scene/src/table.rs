@@ -18,18 +18,30 @@ pub enum TableError {
     TooFew(usize),
 }
 
-/// Points from comma-separated values. The first row may hold headings; when they name x, y and z, those columns are taken, otherwise the
-/// first three. Lines that begin with `#` are remarks.
+/// Points from comma-separated values. The first row may hold headings; when they name x, y and z, those columns are
+/// taken, otherwise the first three. Lines that begin with `#` are remarks.
 pub fn points_from_table(bytes: &[u8]) -> Result<Vec<DVec3>, TableError> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).comment(Some(b'#')).from_reader(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_reader(bytes);
     let mut columns = [0, 1, 2];
     let mut points = Vec::new();
     for (row, record) in reader.records().enumerate() {
-        let record = record.map_err(|e| TableError::Row { line: e.position().map_or(0, csv::Position::line), reason: e.to_string() })?;
+        let record = record.map_err(|e| TableError::Row {
+            line: e.position().map_or(0, csv::Position::line),
+            reason: e.to_string(),
+        })?;
         let line = record.position().map_or(0, csv::Position::line);
         let wrong = |reason: String| TableError::Row { line, reason };
         if row == 0 && record.iter().take(3).all(|f| f.parse::<f64>().is_err()) {
-            let named = |name: &str| record.iter().position(|f| f.split([' ', '[', '(']).next().is_some_and(|w| w.eq_ignore_ascii_case(name)));
+            let named = |name: &str| {
+                record
+                    .iter()
+                    .position(|f| f.split([' ', '[', '(']).next().is_some_and(|w| w.eq_ignore_ascii_case(name)))
+            };
             if let (Some(x), Some(y), Some(z)) = (named("x"), named("y"), named("z")) {
                 columns = [x, y, z];
             }
@@ -38,7 +50,11 @@ pub fn points_from_table(bytes: &[u8]) -> Result<Vec<DVec3>, TableError> {
         let mut p = [0.0; 3];
         for (v, &column) in p.iter_mut().zip(&columns) {
             let field = record.get(column).ok_or_else(|| wrong(format!("{} columns, wanted x, y, z", record.len())))?;
-            *v = field.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| wrong(format!("`{field}` is not a finite number")))?;
+            *v = field
+                .parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .ok_or_else(|| wrong(format!("`{field}` is not a finite number")))?;
         }
         points.push(DVec3::from(p));
     }

@@ -142,12 +142,17 @@ impl From<&Geometry> for ShapeOutline {
         match geometry {
             Geometry::Plane => ShapeOutline::Plane,
             Geometry::Sphere { radius } => ShapeOutline::Sphere { radius: *radius },
-            Geometry::Capsule { radius, half_length } => ShapeOutline::Capsule { radius: *radius, half_length: *half_length },
-            Geometry::Cylinder { radius, half_length } => ShapeOutline::Cylinder { radius: *radius, half_length: *half_length },
-            Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
-            Geometry::Mesh { vertices, triangles } => {
-                ShapeOutline::Mesh { vertices: vertices.iter().map(DVec3::to_array).collect(), triangles: triangles.clone() }
+            Geometry::Capsule { radius, half_length } => {
+                ShapeOutline::Capsule { radius: *radius, half_length: *half_length }
             }
+            Geometry::Cylinder { radius, half_length } => {
+                ShapeOutline::Cylinder { radius: *radius, half_length: *half_length }
+            }
+            Geometry::Box { half_sides } => ShapeOutline::Box { half_sides: half_sides.to_array() },
+            Geometry::Mesh { vertices, triangles } => ShapeOutline::Mesh {
+                vertices: vertices.iter().map(DVec3::to_array).collect(),
+                triangles: triangles.clone(),
+            },
         }
     }
 }
@@ -157,12 +162,17 @@ impl From<&ShapeOutline> for Geometry {
         match outline {
             ShapeOutline::Plane => Geometry::Plane,
             ShapeOutline::Sphere { radius } => Geometry::Sphere { radius: *radius },
-            ShapeOutline::Capsule { radius, half_length } => Geometry::Capsule { radius: *radius, half_length: *half_length },
-            ShapeOutline::Cylinder { radius, half_length } => Geometry::Cylinder { radius: *radius, half_length: *half_length },
-            ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from(*half_sides) },
-            ShapeOutline::Mesh { vertices, triangles } => {
-                Geometry::Mesh { vertices: vertices.iter().map(|v| DVec3::from(*v)).collect(), triangles: triangles.clone() }
+            ShapeOutline::Capsule { radius, half_length } => {
+                Geometry::Capsule { radius: *radius, half_length: *half_length }
             }
+            ShapeOutline::Cylinder { radius, half_length } => {
+                Geometry::Cylinder { radius: *radius, half_length: *half_length }
+            }
+            ShapeOutline::Box { half_sides } => Geometry::Box { half_sides: DVec3::from(*half_sides) },
+            ShapeOutline::Mesh { vertices, triangles } => Geometry::Mesh {
+                vertices: vertices.iter().map(|v| DVec3::from(*v)).collect(),
+                triangles: triangles.clone(),
+            },
         }
     }
 }
@@ -323,18 +333,24 @@ impl Trajectory {
         let short = || damaged("cut short");
         let version = reader.u32().ok_or_else(short)?;
         if !(1..=VERSION).contains(&version) {
-            return Err(TrajectoryError::Damaged(format!("version {version}, this program reads versions 1 to {VERSION}")));
+            return Err(TrajectoryError::Damaged(format!(
+                "version {version}, this program reads versions 1 to {VERSION}"
+            )));
         }
         let stored = u32::from_le_bytes(bytes[bytes.len() - 4..].try_into().unwrap_or_default());
         if crc32fast::hash(reader.bytes) != stored {
             return Err(damaged("the checksum does not fit: cut short or changed"));
         }
         let length = reader.u32().ok_or_else(short)? as usize;
-        let header: Header = serde_json::from_slice(reader.take(length).ok_or_else(short)?).map_err(|e| TrajectoryError::Damaged(format!("header: {e}")))?;
+        let header: Header = serde_json::from_slice(reader.take(length).ok_or_else(short)?)
+            .map_err(|e| TrajectoryError::Damaged(format!("header: {e}")))?;
         let count = reader.u64().ok_or_else(short)?;
         let mut trajectory = Trajectory { header, frames: Vec::new() };
         // The size must fit before anything is allocated for it. With forces a frame is longer than that.
-        let (left, least) = ((reader.bytes.len() - reader.at) as u64, trajectory.frame_bytes(version).and_then(|b| b.checked_mul(count)));
+        let (left, least) = (
+            (reader.bytes.len() - reader.at) as u64,
+            trajectory.frame_bytes(version).and_then(|b| b.checked_mul(count)),
+        );
         if least.is_none_or(|least| if version == 1 { least != left } else { least > left }) {
             return Err(damaged("the number of frames does not fit the length of the file"));
         }
@@ -354,7 +370,9 @@ impl Trajectory {
     /// Bytes of a frame without forces, by the header; `None` where they are beyond counting.
     fn frame_bytes(&self, version: u32) -> Option<u64> {
         // The counts of shapes and grips are those of what was read, so their bytes are few.
-        let mut sum = if version == 1 { 8 } else { 12 } + 28 * self.header.shapes.len() as u64 + 12 * self.header.grips.len() as u64;
+        let mut sum = if version == 1 { 8 } else { 12 }
+            + 28 * self.header.shapes.len() as u64
+            + 12 * self.header.grips.len() as u64;
         for t in &self.header.threads {
             sum = sum.checked_add((t.elements as u64).checked_mul(28)?.checked_add(12)?)?;
         }
@@ -370,7 +388,8 @@ impl Frame {
         self.time.is_finite() && numbers.all(|v| v.is_finite()) && self.forces.as_ref().is_none_or(Forces::is_finite)
     }
 
-    /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts of the thread's elements.
+    /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts
+    /// of the thread's elements.
     pub(crate) fn fit(&mut self, header: &Header) {
         for (thread, (x, q)) in header.threads.iter().zip(self.positions.iter_mut().zip(&mut self.orientations)) {
             refit(thread.elements, x, q, |a, b, u| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * u as f32));
@@ -383,7 +402,10 @@ impl Frame {
 
 impl Forces {
     fn is_finite(&self) -> bool {
-        let contacts = self.contacts.iter().flat_map(|c| c.point.iter().chain(&c.normal).chain(&c.force).copied().chain(c.places().map(|p| p.s)));
+        let contacts = self
+            .contacts
+            .iter()
+            .flat_map(|c| c.point.iter().chain(&c.normal).chain(&c.force).copied().chain(c.places().map(|p| p.s)));
         self.tensions.iter().flatten().chain(self.grips.iter().flatten()).copied().chain(contacts).all(f32::is_finite)
     }
 
@@ -428,7 +450,8 @@ impl Contact {
     }
 }
 
-/// A thread of `n` elements where another one lies: points at equal parts of its elements, the frame of the element in which the new one has its middle.
+/// A thread of `n` elements where another one lies: points at equal parts of its elements, the frame of the element in
+/// which the new one has its middle.
 pub(crate) fn refit<P: Copy, Q: Copy>(n: usize, x: &mut Vec<P>, q: &mut Vec<Q>, lerp: impl Fn(P, P, f64) -> P) {
     let had = q.len();
     if n == had || n == 0 || had == 0 {
@@ -483,7 +506,8 @@ impl<'a> Reader<'a> {
     }
     /// `None` also where it is on a thread or shape that is not there.
     fn contact(&mut self, header: &Header) -> Option<Contact> {
-        let is_there = |p: &OnThread| header.threads.get(p.thread as usize).is_some_and(|t| (p.element as usize) < t.elements);
+        let is_there =
+            |p: &OnThread| header.threads.get(p.thread as usize).is_some_and(|t| (p.element as usize) < t.elements);
         let (on, other, kind) = (self.place()?, self.place()?, self.u32()?);
         let with = match kind & 1 {
             0 => Touched::Thread(Some(other).filter(is_there)?),
@@ -537,13 +561,21 @@ mod tests {
     use super::*;
 
     fn sample() -> Trajectory {
-        let look = ThreadLook { lengths: vec![0.1, 0.3], section: SectionOutline::Ellipse([1e-4, 2e-4]), size: vec![(0.0, 1.0)], seam: None };
+        let look = ThreadLook {
+            lengths: vec![0.1, 0.3],
+            section: SectionOutline::Ellipse([1e-4, 2e-4]),
+            size: vec![(0.0, 1.0)],
+            seam: None,
+        };
         let header = Header {
             scene: "s".into(),
             version: "1".into(),
             frame_rate: 60.0,
             threads: vec![Thread { name: "a".into(), radius: 1e-4, elements: 2, look: Some(look) }],
-            shapes: vec![Shape { name: "post".into(), outline: ShapeOutline::Cylinder { radius: 0.005, half_length: 0.01 } }],
+            shapes: vec![Shape {
+                name: "post".into(),
+                outline: ShapeOutline::Cylinder { radius: 0.005, half_length: 0.01 },
+            }],
             grips: vec!["left".into(), "right".into()],
         };
         let touch = |with: Touched| Contact {
@@ -563,7 +595,10 @@ mod tests {
             forces: Some(Forces {
                 tensions: vec![vec![0.5, 0.25 * t as f32]],
                 grips: vec![[0.0, 0.5, 0.0], [0.0; 3]],
-                contacts: vec![touch(Touched::Shape(0)), touch(Touched::Thread(OnThread { thread: 0, element: 1, s: 0.5 }))],
+                contacts: vec![
+                    touch(Touched::Shape(0)),
+                    touch(Touched::Thread(OnThread { thread: 0, element: 1, s: 0.5 })),
+                ],
             }),
         };
         Trajectory { header, frames: vec![frame(0.0), frame(0.5)] }
@@ -599,7 +634,12 @@ mod tests {
             Trajectory::from_bytes(&t.to_bytes()).is_err()
         };
         assert!(!away(&|_| ()));
-        assert!(away(&|c| c.with = Touched::Shape(1)) && away(&|c| c.on.element = 2) && away(&|c| c.on.thread = 1) && away(&|c| c.force[1] = f32::INFINITY));
+        assert!(
+            away(&|c| c.with = Touched::Shape(1))
+                && away(&|c| c.on.element = 2)
+                && away(&|c| c.on.thread = 1)
+                && away(&|c| c.force[1] = f32::INFINITY)
+        );
     }
 
     #[test]

@@ -46,10 +46,11 @@ impl Dim {
         let mul = i8::saturating_mul;
         Dim { m: mul(self.m, n), kg: mul(self.kg, n), s: mul(self.s, n), rad: mul(self.rad, n) }
     }
-    /// Whether a quantity of dimension `got` may stand where this one is wanted. Radians count only between an angle and a pure
-    /// number: `30 deg` is not a coefficient, though 0.5 is an angle and `1/m` a twist.
+    /// Whether a quantity of dimension `got` may stand where this one is wanted. Radians count only between an angle
+    /// and a pure number: `30 deg` is not a coefficient, though 0.5 is an angle and `1/m` a twist.
     pub fn accepts(self, got: Dim) -> bool {
-        (self.m, self.kg, self.s) == (got.m, got.kg, got.s) && (got.rad == 0 || self.rad != 0 || (self.m, self.kg, self.s) != (0, 0, 0))
+        (self.m, self.kg, self.s) == (got.m, got.kg, got.s)
+            && (got.rad == 0 || self.rad != 0 || (self.m, self.kg, self.s) != (0, 0, 0))
     }
     /// Whether two quantities may be added or compared (angles are numbers here).
     pub fn same_kind(self, o: Dim) -> bool {
@@ -150,7 +151,8 @@ const SYMBOLS: &[(&str, f64, Dim, bool)] = &[
     ("cc", 1e-6, Dim { m: 3, kg: 0, s: 0, rad: 0 }, false),
 ];
 
-const PREFIXES: &[(&str, f64)] = &[("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("μ", 1e-6), ("m", 1e-3), ("c", 1e-2), ("k", 1e3), ("M", 1e6), ("G", 1e9)];
+const PREFIXES: &[(&str, f64)] =
+    &[("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("μ", 1e-6), ("m", 1e-3), ("c", 1e-2), ("k", 1e3), ("M", 1e6), ("G", 1e9)];
 
 /// A unit symbol with or without prefix, such as `mm` or `GPa`.
 pub fn symbol(word: &str) -> Option<Unit> {
@@ -167,12 +169,13 @@ pub fn symbol(word: &str) -> Option<Unit> {
 /// Units that are offered when a word is not one.
 fn known_words() -> Vec<&'static str> {
     vec![
-        "m", "mm", "cm", "um", "km", "kg", "g", "mg", "ug", "s", "ms", "us", "min", "N", "mN", "uN", "kN", "Pa", "kPa", "MPa", "GPa", "J", "mJ", "uJ", "Hz",
-        "kHz", "rad", "deg", "turn", "turns", "%", "cc",
+        "m", "mm", "cm", "um", "km", "kg", "g", "mg", "ug", "s", "ms", "us", "min", "N", "mN", "uN", "kN", "Pa", "kPa",
+        "MPa", "GPa", "J", "mJ", "uJ", "Hz", "kHz", "rad", "deg", "turn", "turns", "%", "cc",
     ]
 }
 
-/// Reads a unit such as `mm`, `m/s^2`, `mN m`, `1/m`. Factors are joined by a space, `*` or `·`; `/` divides by the next factor.
+/// Reads a unit such as `mm`, `m/s^2`, `mN m`, `1/m`. Factors are joined by a space, `*` or `·`; `/` divides by the
+/// next factor.
 pub fn parse_unit(text: &str) -> Result<Unit, String> {
     let mut unit = Unit { size: 1.0, dim: Dim::NUMBER };
     let mut divide = false;
@@ -198,7 +201,9 @@ pub fn parse_unit(text: &str) -> Result<Unit, String> {
             let near = crate::error::nearest(name, known_words());
             return Err(match near {
                 Some(near) => format!("`{name}` is not a unit; did you mean `{near}`?"),
-                None => format!("`{name}` is not a unit (known: m, g, s, N, Pa, J, Hz, rad with prefixes n u m c k M G; deg, turn, min, %)"),
+                None => format!(
+                    "`{name}` is not a unit (known: m, g, s, N, Pa, J, Hz, rad with prefixes n u m c k M G; deg, turn, min, %)"
+                ),
             });
         };
         let power = if divide { -power } else { power };
@@ -243,19 +248,24 @@ pub fn number_length(text: &str) -> usize {
     i
 }
 
-/// A quantity typed outside of a scene, in SI. `like` is an SI unit of what is wanted, such as `N`, and is meant where the text has no
-/// unit. The error is a message.
+/// A quantity typed outside of a scene, in SI. `like` is an SI unit of what is wanted, such as `N`, and is meant where
+/// the text has no unit. The error is a message.
 pub fn in_si(text: &str, like: &str) -> Result<f64, String> {
     let (quantity, wanted) = (parse_quantity(text)?, parse_unit(like)?);
     let plain = quantity.dim == Dim::NUMBER && number_length(text.trim()) == text.trim().len();
-    if plain || wanted.dim.accepts(quantity.dim) { Ok(quantity.value) } else { Err(format!("`{text}` is {}, wanted {}", quantity.dim, wanted.dim)) }
+    if plain || wanted.dim.accepts(quantity.dim) {
+        Ok(quantity.value)
+    } else {
+        Err(format!("`{text}` is {}, wanted {}", quantity.dim, wanted.dim))
+    }
 }
 
 /// Reads a number with a unit, such as `0.225 mm`, `8.7 GPa`, `1/4 turn` is not one.
 pub fn parse_quantity(text: &str) -> Result<Quantity, String> {
     let text = text.trim();
     let n = number_length(text);
-    let value: f64 = text[..n].replace('_', "").parse().map_err(|_| format!("`{text}` does not begin with a number"))?;
+    let value: f64 =
+        text[..n].replace('_', "").parse().map_err(|_| format!("`{text}` does not begin with a number"))?;
     if !value.is_finite() {
         return Err(format!("`{text}` is too large a number"));
     }
@@ -304,9 +314,14 @@ mod tests {
 
     #[test]
     fn wrong_units_are_named_and_the_nearest_is_offered() {
-        for (text, part) in
-            [("3 mmm", "`mm`"), ("3 Gpa", "`GPa`"), ("3 newton", "not a unit"), ("mm", "begin with a number"), ("3 m/", "division"), ("3 m^x", "power")]
-        {
+        for (text, part) in [
+            ("3 mmm", "`mm`"),
+            ("3 Gpa", "`GPa`"),
+            ("3 newton", "not a unit"),
+            ("mm", "begin with a number"),
+            ("3 m/", "division"),
+            ("3 m^x", "power"),
+        ] {
             let e = parse_quantity(text).unwrap_err();
             assert!(e.contains(part), "{text}: {e}");
         }

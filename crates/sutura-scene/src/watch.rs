@@ -177,7 +177,17 @@ impl Check {
         self.last_time = time;
         self.missing |= matches!(value, Value::Number(_) | Value::Vector(_)) && v.is_nan();
         match &mut self.seen {
-            None => self.seen = Some(Seen { first: value.clone(), last: value.clone(), min: v, max: v, worst: value, worst_time: time, badness }),
+            None => {
+                self.seen = Some(Seen {
+                    first: value.clone(),
+                    last: value.clone(),
+                    min: v,
+                    max: v,
+                    worst: value,
+                    worst_time: time,
+                    badness,
+                })
+            }
             Some(seen) => {
                 seen.min = seen.min.min(v);
                 seen.max = seen.max.max(v);
@@ -189,8 +199,14 @@ impl Check {
         }
     }
     pub fn finish(self) -> CheckReport {
-        let mut report =
-            CheckReport { name: self.def.name.clone(), value: None, unit: String::new(), wanted: self.def.words.clone(), passed: false, time_s: None };
+        let mut report = CheckReport {
+            name: self.def.name.clone(),
+            value: None,
+            unit: String::new(),
+            wanted: self.def.words.clone(),
+            passed: false,
+            time_s: None,
+        };
         let Some(seen) = &self.seen else { return report };
         let (value, time) = match self.def.take {
             Take::Every => (seen.worst.clone(), seen.worst_time),
@@ -225,7 +241,8 @@ impl Check {
         };
         // JSON has no infinity; a value that is missing is no value.
         if matches!(report.value, Some(CheckValue::Number(v)) if !v.is_finite()) {
-            report.value = Some(CheckValue::Text(if number(&value).is_nan() { "missing".into() } else { "far".into() }));
+            report.value =
+                Some(CheckValue::Text(if number(&value).is_nan() { "missing".into() } else { "far".into() }));
         }
         report
     }

@@ -5,8 +5,8 @@ use std::path::Path;
 /// Ending of a file that is being written.
 pub const PARTIAL: &str = ".partial";
 
-/// Writes a file by way of another beside it, which is moved to its place when it is whole: whoever is stopped, or finds the disk full, leaves what was
-/// there before. What is no plain file (a pipe, a device) is written to as it is.
+/// Writes a file by way of another beside it, which is moved to its place when it is whole: whoever is stopped, or
+/// finds the disk full, leaves what was there before. What is no plain file (a pipe, a device) is written to as it is.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A link stays one.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
@@ -52,7 +52,10 @@ mod tests {
         write_whole(&link, b"new").unwrap();
         assert!(link.is_symlink() && std::fs::read(&file).unwrap() == b"new");
         if Path::new("/dev/full").exists() {
-            assert_eq!(write_whole(Path::new("/dev/full"), b"new").unwrap_err().kind(), std::io::ErrorKind::StorageFull);
+            assert_eq!(
+                write_whole(Path::new("/dev/full"), b"new").unwrap_err().kind(),
+                std::io::ErrorKind::StorageFull
+            );
         }
     }
 }

@@ -73,7 +73,14 @@ fn slips_are_named_with_line_key_and_suggestion() {
         ("radius = \"5 mm\"", "radius = 0", 12, "shape[0].radius", "> 0", ""),
         ("\"cylinder\"", "\"cilinder\"", 11, "shape[0].kind", "cilinder", "\"cylinder\""),
         ("tension(left) >= 2 N", "tension(lefft) >= 2 N", 18, "phase[0].until", "`lefft`", "`left`"),
-        ("tension(left) >= 2 N", "tension(left) >= 2 mm", 18, "phase[0].until", "a force cannot be compared with a length", ""),
+        (
+            "tension(left) >= 2 N",
+            "tension(left) >= 2 mm",
+            18,
+            "phase[0].until",
+            "a force cannot be compared with a length",
+            "",
+        ),
         ("tension(left) >= 2 N", "tension(left)", 18, "phase[0].until", "condition", ""),
         ("{ move = \"left\"", "{ move = \"lft\"", 22, "phase[0].action[1].move", "`lft`", "`left`"),
         ("at = \"start\"", "at = \"strat\"", 21, "phase[0].action[0].at", "strat", "\"start\""),
@@ -81,8 +88,22 @@ fn slips_are_named_with_line_key_and_suggestion() {
         ("at = \"start\"", "at = \"particle 21\"", 21, "phase[0].action[0].at", "particles 0 to 20", ""),
         ("at = \"start\"", "at = \"start\", thread = \"silc\"", 21, "phase[0].action[0].thread", "`silc`", "`silk`"),
         ("{ take = \"left\", at = \"start\" }", "{ }", 21, "phase[0].action[0]", "does nothing", "take"),
-        ("{ take = \"left\", at = \"start\" }", "{ material = \"silk\" }", 21, "phase[0].action[0]", "what of the material", "young_modulus"),
-        ("{ take = \"left\", at = \"start\" }", "{ material = \"silc\", density = 1 }", 21, "phase[0].action[0].material", "`silc`", "`silk`"),
+        (
+            "{ take = \"left\", at = \"start\" }",
+            "{ material = \"silk\" }",
+            21,
+            "phase[0].action[0]",
+            "what of the material",
+            "young_modulus",
+        ),
+        (
+            "{ take = \"left\", at = \"start\" }",
+            "{ material = \"silc\", density = 1 }",
+            21,
+            "phase[0].action[0].material",
+            "`silc`",
+            "`silk`",
+        ),
         (
             "{ take = \"left\", at = \"start\" }",
             "{ material = \"silk\", density = \"1 mm\" }",
@@ -91,8 +112,22 @@ fn slips_are_named_with_line_key_and_suggestion() {
             "a length, wanted a density",
             "",
         ),
-        ("{ take = \"left\", at = \"start\" }", "{ material = \"silk\", plasticity = \"nune\" }", 21, "phase[0].action[0].plasticity", "nune", "\"none\""),
-        ("duration = \"0.5 s\"", "duration = \"0.5 mm\"", 22, "phase[0].action[1].keys[0].duration", "a length, wanted a time", ""),
+        (
+            "{ take = \"left\", at = \"start\" }",
+            "{ material = \"silk\", plasticity = \"nune\" }",
+            21,
+            "phase[0].action[0].plasticity",
+            "nune",
+            "\"none\"",
+        ),
+        (
+            "duration = \"0.5 s\"",
+            "duration = \"0.5 mm\"",
+            22,
+            "phase[0].action[1].keys[0].duration",
+            "a length, wanted a time",
+            "",
+        ),
         (", duration = \"0.5 s\"", "", 22, "phase[0].action[1].keys[0]", "when is missing", ""),
         ("what = \"force(left)\"", "what = \"frce(left)\"", 27, "probe[0].what", "`frce`", "`force`"),
         ("unit = \"mN\"", "unit = \"mm\"", 28, "probe[0].unit", "does not fit", ""),
@@ -104,27 +139,94 @@ fn slips_are_named_with_line_key_and_suggestion() {
         ("[[probe]]", "[[prob]]", 25, "prob", "unknown key", "`probe`"),
         ("elements = 20", "elements = 20\npoisson_ratio = 0.7", 7, "thread[0].poisson_ratio", "0.7", ""),
         ("elements = 20", "elements = 20\nsection = \"rund\"", 7, "thread[0].section", "rund", "\"round\""),
-        ("elements = 20", "elements = 20\nsection = { ellipse = \"[1, 0] mm\" }", 7, "thread[0].section.ellipse", "two lengths > 0", ""),
-        ("elements = 20", "elements = 20\nsection = { rectangle = [\"1 mm\", \"1 mN\"] }", 7, "thread[0].section.rectangle[1]", "a force", ""),
-        ("elements = 20", "elements = 20\nsection = { elipse = [1, 1] }", 7, "thread[0].section.elipse", "unknown key", "`ellipse`"),
-        ("elements = 20", "elements = 20\nradius = [[0, 1e-4], [0, 2e-4]]", 7, "thread[0].radius[1][0]", "must grow", ""),
+        (
+            "elements = 20",
+            "elements = 20\nsection = { ellipse = \"[1, 0] mm\" }",
+            7,
+            "thread[0].section.ellipse",
+            "two lengths > 0",
+            "",
+        ),
+        (
+            "elements = 20",
+            "elements = 20\nsection = { rectangle = [\"1 mm\", \"1 mN\"] }",
+            7,
+            "thread[0].section.rectangle[1]",
+            "a force",
+            "",
+        ),
+        (
+            "elements = 20",
+            "elements = 20\nsection = { elipse = [1, 1] }",
+            7,
+            "thread[0].section.elipse",
+            "unknown key",
+            "`ellipse`",
+        ),
+        (
+            "elements = 20",
+            "elements = 20\nradius = [[0, 1e-4], [0, 2e-4]]",
+            7,
+            "thread[0].radius[1][0]",
+            "must grow",
+            "",
+        ),
         ("elements = 20", "elements = 20\nradius = [[0, 1e-4], [0.1, 0]]", 7, "thread[0].radius[1][1]", "> 0", ""),
-        ("elements = 20", "elements = 20\ndensity = [[0, \"1 mm\"]]", 7, "thread[0].density[0][1]", "a length, wanted", ""),
+        (
+            "elements = 20",
+            "elements = 20\ndensity = [[0, \"1 mm\"]]",
+            7,
+            "thread[0].density[0][1]",
+            "a length, wanted",
+            "",
+        ),
         ("elements = 20", "elements = 20\nyoung_modulus = []", 7, "thread[0].young_modulus", "at least one pair", ""),
-        ("elements = 20", "radius = [[0, 1e-4]]\nsection_scale = [[0, 1]]\nelements = 20", 7, "thread[0].section_scale", "exclude", ""),
-        ("elements = 20", "radius = [[0, 1e-4]]\nsection = { ellipse = [1e-4, 2e-4] }\nelements = 20", 6, "thread[0].radius", "one radius", "`section_scale`"),
-        ("elements = 20", "elements = 20\npretwist = \"1 mm\"", 7, "thread[0].pretwist", "a length, wanted an angle", ""),
+        (
+            "elements = 20",
+            "radius = [[0, 1e-4]]\nsection_scale = [[0, 1]]\nelements = 20",
+            7,
+            "thread[0].section_scale",
+            "exclude",
+            "",
+        ),
+        (
+            "elements = 20",
+            "radius = [[0, 1e-4]]\nsection = { ellipse = [1e-4, 2e-4] }\nelements = 20",
+            6,
+            "thread[0].radius",
+            "one radius",
+            "`section_scale`",
+        ),
+        (
+            "elements = 20",
+            "elements = 20\npretwist = \"1 mm\"",
+            7,
+            "thread[0].pretwist",
+            "a length, wanted an angle",
+            "",
+        ),
         ("\"[100, 0, 0] mm\"", "\"[0, 0, 0] mm\"", 7, "thread[0].line", "no length", ""),
         ("elements = 20", "elements = 50001", 6, "thread[0].elements", "50000", ""),
         ("max_duration = \"1 s\"", "max_duration = \"1e9 s\"", 16, "phase[0]", "frames, at most", ""),
-        ("[[thread]]", "solver = { substep = 1e-12 }\n[[thread]]", 2, "solver.substep", "substeps in a frame, at most", ""),
+        (
+            "[[thread]]",
+            "solver = { substep = 1e-12 }\n[[thread]]",
+            2,
+            "solver.substep",
+            "substeps in a frame, at most",
+            "",
+        ),
         ("name = \"pull\"", "name = \"pull", 17, "", "", ""),
     ] {
         assert!(GOOD.contains(from), "{from}");
         let e = error(&GOOD.replacen(from, to, 1));
         let found = e.problems.iter().any(|p| {
             let message = format!("{} {}", p.message, p.help.clone().unwrap_or_default());
-            p.line == Some(line) && p.key == key && message.contains(words) && message.contains(help) && p.file == "bad.toml"
+            p.line == Some(line)
+                && p.key == key
+                && message.contains(words)
+                && message.contains(help)
+                && p.file == "bad.toml"
         });
         assert!(found, "{to}: wanted line {line}, `{key}`, \"{words}\", \"{help}\"; found\n{e}");
     }
@@ -132,7 +234,8 @@ fn slips_are_named_with_line_key_and_suggestion() {
 
 #[test]
 fn several_problems_are_reported_at_once_in_the_order_of_the_file() {
-    let text = GOOD.replace("elements = 20", "elements = 0").replace("\"5 mm\"", "\"5 N\"").replace("(left) >=", "(right) >=");
+    let text =
+        GOOD.replace("elements = 20", "elements = 0").replace("\"5 mm\"", "\"5 N\"").replace("(left) >=", "(right) >=");
     let lines: Vec<_> = error(&text).problems.iter().filter_map(|p| p.line).collect();
     assert!(lines.contains(&6) && lines.contains(&12) && lines.contains(&18), "{lines:?}");
     assert!(lines.is_sorted(), "{lines:?}");
@@ -140,8 +243,9 @@ fn several_problems_are_reported_at_once_in_the_order_of_the_file() {
 
 #[test]
 fn what_only_the_engine_knows_is_named_with_the_line_too() {
-    let twice =
-        GOOD.replace("line = { from = [0, 0, 0], to = \"[100, 0, 0] mm\" }", "points = [[0, 0, 0], [0, 0, 0], [1, 0, 0]]").replace("elements = 20\n", "");
+    let twice = GOOD
+        .replace("line = { from = [0, 0, 0], to = \"[100, 0, 0] mm\" }", "points = [[0, 0, 0], [0, 0, 0], [1, 0, 0]]")
+        .replace("elements = 20\n", "");
     let e = error(&twice);
     assert_eq!(e.problems[0].line, Some(2));
     assert!(e.to_string().contains("centerline[0..1]"), "{e}");
@@ -157,14 +261,19 @@ fn elements_are_counted_over_all_threads() {
 
 #[test]
 fn grips_must_be_taken_before_they_are_used() {
-    let again = GOOD.replace("{ take = \"left\", at = \"start\" },", "{ take = \"left\", at = \"start\" }, { let_go = \"left\" },");
+    let again = GOOD
+        .replace("{ take = \"left\", at = \"start\" },", "{ take = \"left\", at = \"start\" }, { let_go = \"left\" },");
     let e = error(&again);
     assert!(e.to_string().contains("does not hold anything then") && e.problems[0].line == Some(22), "{e}");
 }
 
 #[test]
 fn missing_files_are_named() {
-    let e = error(&GOOD.replace("line = { from = [0, 0, 0], to = \"[100, 0, 0] mm\" }", "points = { file = \"no_such_file.csv\" }"));
+    let e =
+        error(&GOOD.replace(
+            "line = { from = [0, 0, 0], to = \"[100, 0, 0] mm\" }",
+            "points = { file = \"no_such_file.csv\" }",
+        ));
     assert!(e.to_string().contains("no_such_file.csv") && e.problems[0].line == Some(7), "{e}");
     let e = error(&format!("start = \"no_such_state\"\n{GOOD}"));
     assert!(e.to_string().contains("no_such_state") && e.problems[0].line == Some(1), "{e}");

@@ -1,5 +1,6 @@
-//! Cases of mechanics written as scenes alone, to show that the format is enough for them. Numbers are closed forms or converged
-//! solutions of the equations; T1 is a 2-0 monofilament (0.30 mm, 2 GPa, nu 0.4, 1150 kg/m^3; E I = 7.95216e-7 N m^2).
+//! Cases of mechanics written as scenes alone, to show that the format is enough for them. Numbers are closed forms or
+//! converged solutions of the equations; T1 is a 2-0 monofilament (0.30 mm, 2 GPa, nu 0.4, 1150 kg/m^3; E I =
+//! 7.95216e-7 N m^2).
 
 use sutura_scene::{Outcome, Runner, Scene};
 
@@ -15,7 +16,14 @@ fn run(text: &str) -> Outcome {
 fn passes(text: &str) {
     let r = run(text).report;
     for c in &r.checks {
-        println!("{} {}: {} {} (wanted {})", c.passed, c.name, c.value.as_ref().map_or("-".into(), ToString::to_string), c.unit, c.wanted);
+        println!(
+            "{} {}: {} {} (wanted {})",
+            c.passed,
+            c.name,
+            c.value.as_ref().map_or("-".into(), ToString::to_string),
+            c.unit,
+            c.wanted
+        );
     }
     println!("{:?} {:?}", r.phases, r.incidents);
     assert!(r.passed);
@@ -64,7 +72,8 @@ action = [{{ unload = "nudge" }}]
     }
 }
 
-/// First bending mode of a cantilever of 50 mm: 22.139 Hz. From release to the second crossing of the axis is three quarters of a period.
+/// First bending mode of a cantilever of 50 mm: 22.139 Hz. From release to the second crossing of the axis is three
+/// quarters of a period.
 #[test]
 fn a_cantilever_rings_at_its_frequency() {
     passes(&format!(
@@ -156,7 +165,8 @@ tolerance = "1 %"      # a frame is 0.5 %
     ));
 }
 
-/// Localized helical buckling: clamped rod of 0.2 m, ends brought together by 10 mm and turned 12 times: T = 15.84 mN, M = 0.21004 mN m.
+/// Localized helical buckling: clamped rod of 0.2 m, ends brought together by 10 mm and turned 12 times: T = 15.84 mN,
+/// M = 0.21004 mN m.
 #[test]
 fn localized_buckling_has_its_tension_and_torque() {
     passes(&format!(
@@ -211,7 +221,8 @@ tolerance = 0.005
     ));
 }
 
-/// Free fall: N substeps give g h^2 N (N + 1) / 2, at 1/600 s for 0.5 s 1.230338 m; damping multiplies the speed by (1 - d)^t.
+/// Free fall: N substeps give g h^2 N (N + 1) / 2, at 1/600 s for 0.5 s 1.230338 m; damping multiplies the speed by (1
+/// - d)^t.
 #[test]
 fn a_thread_falls_and_is_slowed_by_the_identities_of_the_integrator() {
     passes(&format!(
@@ -253,8 +264,8 @@ tolerance = "1 nm/s"
     ));
 }
 
-/// A helical spring of five turns (R 5 mm, pitch angle 10 degrees) pulled along its axis by 0.2 mN lengthens by 1.38683 mm when its end
-/// may turn. The pull acts on the axis: at the end of the thread that is a force and a torque.
+/// A helical spring of five turns (R 5 mm, pitch angle 10 degrees) pulled along its axis by 0.2 mN lengthens by 1.38683
+/// mm when its end may turn. The pull acts on the axis: at the end of the thread that is a force and a torque.
 #[test]
 fn a_helical_spring_has_its_stiffness() {
     let (radius, turns) = (5.0_f64, 5.0_f64);

@@ -157,7 +157,8 @@ at_most = "0.01 N"
     assert!(r.incidents.is_empty() && r.passed && r.passes_through != Some(true), "{:?} {:?}", r.incidents, r.checks);
 }
 
-/// A thread falls in a slot between two walls of one mesh onto the lower one, and in a closed box, whose triangles face in, onto its floor.
+/// A thread falls in a slot between two walls of one mesh onto the lower one, and in a closed box, whose triangles face
+/// in, onto its floor.
 #[test]
 fn walls_of_one_mesh_are_kept_apart() {
     let thread = r#"
@@ -197,8 +198,9 @@ tolerance = "0.03 mm"
     }
 }
 
-/// 50 mN over the edge of a box, drawn and let out: no incident, and at the grip what friction allows. A thread that bends over an edge at one place pulls
-/// 1.326 times as much for mu = 0.2 (theory 11.3), a belt 1.369; it may stick below that.
+/// 50 mN over the edge of a box, drawn and let out: no incident, and at the grip what friction allows. A thread that
+/// bends over an edge at one place pulls 1.326 times as much for mu = 0.2 (theory 11.3), a belt 1.369; it may stick
+/// below that.
 #[test]
 fn an_edge_is_drawn_over() {
     holds(
@@ -254,8 +256,9 @@ between = ["34 mN", "48 mN"]
     );
 }
 
-/// Two threads crossed between a table and a plate lie as deep in each other as Hertz says, wherever the joints are: with an even number of elements the places that
-/// cross are at a joint, with an odd one in the middle of an element. For 5 N the depth is 11.6 % of the diameter, from 2 % before touch on.
+/// Two threads crossed between a table and a plate lie as deep in each other as Hertz says, wherever the joints are:
+/// with an even number of elements the places that cross are at a joint, with an odd one in the middle of an element.
+/// For 5 N the depth is 11.6 % of the diameter, from 2 % before touch on.
 #[test]
 fn a_crossing_is_as_deep_wherever_the_joints_are() {
     for (a, b, aside) in [(40, 40, 0.0), (40, 41, 0.0), (41, 41, 0.0), (40, 40, 0.05), (40, 40, 0.2)] {

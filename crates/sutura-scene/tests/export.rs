@@ -7,7 +7,8 @@ use sutura::{Profile, Section};
 use sutura_scene::export::{ExportError, Exporter, Format, Loads, Moment, Options, Strand};
 use sutura_scene::{Header, Runner, Scene, ThreadLook, Trajectory};
 
-/// A thread that falls over a post, a ring closed with a twist that is no whole number of turns, and a bar that moves and turns.
+/// A thread that falls over a post, a ring closed with a twist that is no whole number of turns, and a bar that moves
+/// and turns.
 const SCENE: &str = r#"
 title = "Three things"
 frame_rate = 60
@@ -94,8 +95,18 @@ impl Read {
 
     fn keys(&self, node: &gltf::Node<'_>, n: usize) -> Keys {
         let (translation, rotation, scale) = node.transform().decomposed();
-        let mut keys = Keys { times: Vec::new(), translations: vec![translation; n], rotations: vec![rotation; n], scales: vec![scale; n] };
-        for channel in self.document.animations().flat_map(|a| a.channels().collect::<Vec<_>>()).filter(|c| c.target().node().index() == node.index()) {
+        let mut keys = Keys {
+            times: Vec::new(),
+            translations: vec![translation; n],
+            rotations: vec![rotation; n],
+            scales: vec![scale; n],
+        };
+        for channel in self
+            .document
+            .animations()
+            .flat_map(|a| a.channels().collect::<Vec<_>>())
+            .filter(|c| c.target().node().index() == node.index())
+        {
             let reader = channel.reader(|_| Some(&self.bytes));
             keys.times = reader.read_inputs().unwrap().collect();
             match reader.read_outputs().unwrap() {
@@ -141,7 +152,10 @@ fn joints_go_the_way_of_the_elements() {
                 assert!(keys.times.is_empty() || (f64::from(keys.times[i]) - frame.time).abs() < 1e-6);
             }
             for w in keys.rotations.windows(2) {
-                assert!(Quat::from_array(w[0]).dot(Quat::from_array(w[1])) > 0.0, "between two keys a rotation takes the long way");
+                assert!(
+                    Quat::from_array(w[0]).dot(Quat::from_array(w[1])) > 0.0,
+                    "between two keys a rotation takes the long way"
+                );
             }
         }
     }
@@ -164,7 +178,12 @@ fn a_glb_poses_as_the_skin_does() {
         let k = t.header.threads.iter().position(|t| Some(t.name.as_str()) == skin.name()).unwrap();
         let primitive = node.mesh().unwrap().primitives().next().unwrap();
         let reader = primitive.reader(|_| Some(&read.bytes));
-        let inverse: Vec<Mat4> = skin.reader(|_| Some(&read.bytes)).read_inverse_bind_matrices().unwrap().map(|m| Mat4::from_cols_array_2d(&m)).collect();
+        let inverse: Vec<Mat4> = skin
+            .reader(|_| Some(&read.bytes))
+            .read_inverse_bind_matrices()
+            .unwrap()
+            .map(|m| Mat4::from_cols_array_2d(&m))
+            .collect();
         let matrices: Vec<Mat4> = skin
             .joints()
             .zip(&inverse)
@@ -181,7 +200,8 @@ fn a_glb_poses_as_the_skin_does() {
         // The skin of the engine, where the elements of the recording are.
         let thread = &t.header.threads[k];
         let look: &ThreadLook = thread.look.as_ref().unwrap();
-        let own = Skin::new(&SkinSpec { seam: look.seam, ..SkinSpec::new(look.lengths.clone(), thread.radius) }).unwrap();
+        let own =
+            Skin::new(&SkinSpec { seam: look.seam, ..SkinSpec::new(look.lengths.clone(), thread.radius) }).unwrap();
         assert_eq!((own.n_vertices(), own.n_bones()), (positions.len(), matrices.len()));
         let mut bones = vec![Bone::default(); own.n_bones()];
         own.bones_at(&moment.threads[k].positions, &moment.threads[k].orientations, &mut bones);
@@ -189,7 +209,8 @@ fn a_glb_poses_as_the_skin_does() {
         own.pose(&bones, &mut x, &mut n);
         let mut worst = 0.0f32;
         for i in 0..positions.len() {
-            let blended = (0..4).map(|c| matrices[usize::from(joints[i][c])] * weights[i][c]).fold(Mat4::ZERO, |a, b| a + b);
+            let blended =
+                (0..4).map(|c| matrices[usize::from(joints[i][c])] * weights[i][c]).fold(Mat4::ZERO, |a, b| a + b);
             let there = blended * Vec4::from((Vec3::from(positions[i]), 1.0));
             worst = worst.max((there.truncate() - Vec3::from(x[i])).length());
         }
@@ -246,7 +267,13 @@ fn a_scene_can_be_set_upright() {
 fn the_same_recording_gives_the_same_bytes_and_a_series_leaves_no_old_files() {
     let folder = tempfile::tempdir().unwrap();
     let t = recorded();
-    for (format, name) in [(Format::Glb, "a.glb"), (Format::Csv, "a.csv"), (Format::Obj, "a.obj"), (Format::Vtk, "vtk"), (Format::Obj, "obj")] {
+    for (format, name) in [
+        (Format::Glb, "a.glb"),
+        (Format::Csv, "a.csv"),
+        (Format::Obj, "a.obj"),
+        (Format::Vtk, "vtk"),
+        (Format::Obj, "obj"),
+    ] {
         let both: Vec<Vec<(String, Vec<u8>)>> = ["one", "two"]
             .map(|run| {
                 let out = folder.path().join(run).join(name);
@@ -255,9 +282,16 @@ fn the_same_recording_gives_the_same_bytes_and_a_series_leaves_no_old_files() {
                     export(&t, format, &out, ALL).unwrap();
                 }
                 export(&t, format, &out, Options { rate: 20.0, ..ALL }).unwrap();
-                let mut files: Vec<_> = if out.is_dir() { std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().path()).collect() } else { vec![out] };
+                let mut files: Vec<_> = if out.is_dir() {
+                    std::fs::read_dir(&out).unwrap().map(|e| e.unwrap().path()).collect()
+                } else {
+                    vec![out]
+                };
                 files.sort();
-                files.into_iter().map(|f| (f.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(f).unwrap())).collect()
+                files
+                    .into_iter()
+                    .map(|f| (f.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(f).unwrap()))
+                    .collect()
             })
             .to_vec();
         assert!(both[0] == both[1], "{format:?}");
@@ -268,7 +302,10 @@ fn the_same_recording_gives_the_same_bytes_and_a_series_leaves_no_old_files() {
 /// The array of a name in a VTK file, whole, as floats.
 fn array(text: &str, name: &str) -> Vec<f32> {
     use base64::Engine as _;
-    let tag = text.split("<DataArray ").find(|a| a.contains(&format!("Name=\"{name}\""))).unwrap_or_else(|| panic!("no {name}"));
+    let tag = text
+        .split("<DataArray ")
+        .find(|a| a.contains(&format!("Name=\"{name}\"")))
+        .unwrap_or_else(|| panic!("no {name}"));
     let data = tag.split_once('>').unwrap().1.split('<').next().unwrap();
     let bytes = base64::engine::general_purpose::STANDARD.decode(data).unwrap();
     assert_eq!(u32::from_le_bytes(bytes[..4].try_into().unwrap()) as usize, bytes.len() - 4);
@@ -288,7 +325,10 @@ fn vtk_has_curvature_and_twist_of_a_curve_that_is_known() {
             let along = (at(k as f64 + 1.0, radius) - at(k as f64, radius)).normalize();
             sutura::math::frame_from_tangent(along, DVec3::Z) * DQuat::from_rotation_z(rate * length * k as f64)
         };
-        let loads = Loads { tensions: (0..n).map(|e| e as f64).collect(), contact_forces: (0..=n).map(|i| DVec3::Y * i as f64).collect() };
+        let loads = Loads {
+            tensions: (0..n).map(|e| e as f64).collect(),
+            contact_forces: (0..=n).map(|i| DVec3::Y * i as f64).collect(),
+        };
         Strand {
             positions: (0..=n).map(|k| at(k as f64, radius)).collect(),
             orientations: (0..n).map(frame).collect(),
@@ -298,7 +338,8 @@ fn vtk_has_curvature_and_twist_of_a_curve_that_is_known() {
     };
     let turned = rate * 2.0 * radius * (0.5 * std::f64::consts::TAU / n as f64).sin() * n as f64;
     for (angle, seam) in [(0.5 * std::f64::consts::PI, None), (std::f64::consts::TAU, Some(-turned))] {
-        let look = ThreadLook { lengths: vec![1e-3; n], section: Section::Round.into(), size: Profile::default().0, seam };
+        let look =
+            ThreadLook { lengths: vec![1e-3; n], section: Section::Round.into(), size: Profile::default().0, seam };
         let thread = sutura_scene::Thread { name: "arc".into(), radius: 1e-4, elements: n, look: Some(look) };
         let header = Header { threads: vec![thread], ..Header::default() };
         let mut exporter = Exporter::new(Format::Vtk, &header, folder.path(), ALL).unwrap();
@@ -309,7 +350,8 @@ fn vtk_has_curvature_and_twist_of_a_curve_that_is_known() {
         let (curvature, twist) = (array(&text, "curvature"), array(&text, "twist"));
         let inner = if seam.is_some() { 0..n + 1 } else { 1..n };
         for i in inner {
-            // Bend a and twist of a joint in one rotation vector are off by a twelfth of a^2, 0.2 % where the polygon turns by 9 degrees.
+            // Bend a and twist of a joint in one rotation vector are off by a twelfth of a^2, 0.2 % where the polygon
+            // turns by 9 degrees.
             assert!((f64::from(curvature[i]) * radius - 1.0).abs() < 2.5e-3, "{seam:?}: {} at {i}", curvature[i]);
             assert!((f64::from(twist[i]) / rate - 1.0).abs() < 2.5e-3, "{seam:?}: {} at {i}", twist[i]);
         }
@@ -332,7 +374,8 @@ fn a_run_under_way_tells_its_forces_and_so_does_its_recording() {
     let mut runner = Runner::new(Scene::parse(SCENE, "three.toml").unwrap()).unwrap();
     while !runner.step_frame().finished {}
     let moment = Moment::of_runner(&runner);
-    // Contacts between threads cancel, so what is left is what the shapes do: the weight of the thread that lies on the post, and more while it falls.
+    // Contacts between threads cancel, so what is left is what the shapes do: the weight of the thread that lies on the
+    // post, and more while it falls.
     let loads = moment.threads[0].loads.as_ref().unwrap();
     let sum: DVec3 = loads.contact_forces.iter().sum();
     let all: DVec3 = runner.world().contacts().filter(|c| c.a.0 == 0).map(|c| c.force).sum();
@@ -347,7 +390,8 @@ fn a_run_under_way_tells_its_forces_and_so_does_its_recording() {
         assert!(a.tensions.iter().zip(&b.tensions).all(|(a, b)| *a == f64::from(*b as f32)));
         assert!(a.contact_forces.iter().zip(&b.contact_forces).all(|(a, b)| (*a - *b).length() < 1e-6 * greatest));
     }
-    // Nothing acts on the thread of the recording that does not act on that of the run, so all that it says of grips and contacts is there.
+    // Nothing acts on the thread of the recording that does not act on that of the run, so all that it says of grips
+    // and contacts is there.
     let forces = runner.frame().forces.unwrap();
     assert_eq!(forces.contacts.len(), runner.world().contacts().count());
     for ((_, handle), force) in runner.grips().zip(&forces.grips) {
@@ -373,7 +417,8 @@ fn tables_and_obj_hold_the_positions() {
     }
     export(&t, Format::Obj, &obj, ALL).unwrap();
     let text = std::fs::read_to_string(obj).unwrap();
-    let lines = |tag: &str| text.lines().filter(|l| l.starts_with(tag)).map(|l| l[tag.len()..].to_owned()).collect::<Vec<_>>();
+    let lines =
+        |tag: &str| text.lines().filter(|l| l.starts_with(tag)).map(|l| l[tag.len()..].to_owned()).collect::<Vec<_>>();
     let (v, vn, f) = (lines("v "), lines("vn "), lines("f "));
     assert_eq!((lines("o "), v.len()), (["silk", "ring", "post", "bar", "floor"].map(String::from).to_vec(), vn.len()));
     // Every vertex of the first thread is a radius from its centerline, but for the parts that blending takes.
@@ -382,11 +427,16 @@ fn tables_and_obj_hold_the_positions() {
     for line in &v[..first] {
         let c: Vec<f64> = line.split(' ').map(|t| t.parse().unwrap()).collect();
         let x = DVec3::new(c[0], c[1], c[2]);
-        let to = |w: &[DVec3]| (x - (w[0] + (w[1] - w[0]) * ((x - w[0]).dot(w[1] - w[0]) / (w[1] - w[0]).length_squared()).clamp(0.0, 1.0))).length();
+        let to = |w: &[DVec3]| {
+            (x - (w[0]
+                + (w[1] - w[0]) * ((x - w[0]).dot(w[1] - w[0]) / (w[1] - w[0]).length_squared()).clamp(0.0, 1.0)))
+            .length()
+        };
         let off = center.windows(2).map(to).fold(f64::INFINITY, f64::min) / t.header.threads[0].radius;
         assert!((0.8..1.2).contains(&off), "{off} radii");
     }
-    let most = f.iter().flat_map(|l| l.split(' ')).map(|c| c.split('/').next().unwrap().parse::<usize>().unwrap()).max();
+    let most =
+        f.iter().flat_map(|l| l.split(' ')).map(|c| c.split('/').next().unwrap().parse::<usize>().unwrap()).max();
     assert_eq!(most, Some(v.len()), "faces count vertices from one, through all objects");
 }
 

@@ -66,7 +66,8 @@ equals = "1 mm"
 tolerance = "1 nm"
 "#
     ));
-    let phases: Vec<_> = out.report.phases.iter().map(|p| (p.ended_by.as_str(), (p.end_s * 1e3).round() as i64)).collect();
+    let phases: Vec<_> =
+        out.report.phases.iter().map(|p| (p.ended_by.as_str(), (p.end_s * 1e3).round() as i64)).collect();
     assert_eq!(phases, [("duration", 50), ("condition", 100), ("motions done", 130), ("out of time", 150)]);
     assert!(out.report.passed, "{:?}", out.report.checks);
     assert_eq!(out.report.frames, 15);
@@ -74,8 +75,8 @@ tolerance = "1 nm"
     assert!((out.report.simulated_s - 0.15).abs() < 1e-12);
 }
 
-/// A thread that nothing holds falls g h^2 n (n + 1) / 2 in n substeps h of implicit Euler: 9.8 mm in four of a hundredth of a second, 14.7 mm in five;
-/// 54 mm in the ten of a frame.
+/// A thread that nothing holds falls g h^2 n (n + 1) / 2 in n substeps h of implicit Euler: 9.8 mm in four of a
+/// hundredth of a second, 14.7 mm in five; 54 mm in the ten of a frame.
 const FALLING: &str = r#"
 frame_rate = 10
 [solver]
@@ -132,7 +133,8 @@ equals = "-9.7 mm"
 tolerance = "0.1 mm"
 "#
     );
-    let mut runner = Runner::recording(Scene::parse(&text, "test.toml").unwrap_or_else(|e| panic!("{e}"))).unwrap_or_else(|e| panic!("{e}"));
+    let mut runner = Runner::recording(Scene::parse(&text, "test.toml").unwrap_or_else(|e| panic!("{e}")))
+        .unwrap_or_else(|e| panic!("{e}"));
     while !runner.step_frame().finished {}
     let out = runner.finish();
     assert!(out.report.passed, "{:#?}", out.report.checks);
@@ -159,7 +161,8 @@ fn a_phase_without_a_condition_steps_whole_frames() {
     let text = FALLING.replace("until = \"fallen >= 10 mm\"", "duration = \"0.1 s\"");
     let mut runner = Runner::recording(Scene::parse(&text, "test.toml").unwrap()).unwrap();
     while !runner.step_frame().finished {}
-    let steps = runner.finish().input.unwrap().inputs.into_iter().filter(|i| matches!(i, sutura::input::Input::Step(..)));
+    let steps =
+        runner.finish().input.unwrap().inputs.into_iter().filter(|i| matches!(i, sutura::input::Input::Step(..)));
     assert_eq!(steps.count(), 1);
 }
 
@@ -316,8 +319,18 @@ fn a_check_that_fails_says_what_it_found() {
 fn the_report_and_the_recording_read_back() {
     let out = run(&format!("{HANGING}\n[[phase]]\nduration = \"30 ms\"\n"));
     let json = serde_json::to_string_pretty(&out.report).unwrap();
-    for key in ["scene", "solver", "simulated_s", "cpu_s", "real_time_factor", "ms_per_frame", "max_tension_N", "min_clearance", "passes_through", "state_hash"]
-    {
+    for key in [
+        "scene",
+        "solver",
+        "simulated_s",
+        "cpu_s",
+        "real_time_factor",
+        "ms_per_frame",
+        "max_tension_N",
+        "min_clearance",
+        "passes_through",
+        "state_hash",
+    ] {
         assert!(json.contains(&format!("\"{key}\"")), "{key}");
     }
     assert_eq!(serde_json::from_str::<sutura_scene::Report>(&json).unwrap(), out.report);
@@ -331,8 +344,9 @@ fn the_report_and_the_recording_read_back() {
 
 #[test]
 fn two_runs_give_the_same_state() {
-    let text =
-        format!("{HANGING}\n[[phase]]\nduration = \"0.2 s\"\naction = [{{ move = \"wall\", keys = [{{ by = \"[3, 0, 0] mm\", duration = \"0.1 s\" }}] }}]\n");
+    let text = format!(
+        "{HANGING}\n[[phase]]\nduration = \"0.2 s\"\naction = [{{ move = \"wall\", keys = [{{ by = \"[3, 0, 0] mm\", duration = \"0.1 s\" }}] }}]\n"
+    );
     assert_eq!(run(&text).report.state_hash, run(&text).report.state_hash);
 }
 
@@ -347,7 +361,9 @@ fn a_saved_state_goes_on_as_if_it_had_not_stopped() {
     assert_eq!(whole.saved[0].name, "moved.state");
     std::fs::write(folder.path().join("moved.state"), &whole.saved[0].bytes).unwrap();
     let threads_only = HANGING.split("[[grip]]").next().unwrap();
-    let text = format!("start = \"moved.state\"\n{threads_only}\n{second}\n[[check]]\nthat = \"held(wall) and not held(hand) and not held(spare)\"\n");
+    let text = format!(
+        "start = \"moved.state\"\n{threads_only}\n{second}\n[[check]]\nthat = \"held(wall) and not held(hand) and not held(spare)\"\n"
+    );
     let path = folder.path().join("second.toml");
     std::fs::write(&path, text).unwrap();
     let scene = Scene::load(&path).unwrap_or_else(|e| panic!("{e}"));
@@ -385,7 +401,8 @@ tolerance = "1 um"
     assert!(out.report.passed, "{:#?}", out.report.checks);
 }
 
-/// Two clamped tapes side by side, one on its edge, and a tapered thread: closed forms of `crates/sutura/tests/sections.rs` through a scene.
+/// Two clamped tapes side by side, one on its edge, and a tapered thread: closed forms of
+/// `crates/sutura/tests/sections.rs` through a scene.
 #[test]
 fn sections_and_tables_along_the_thread_reach_the_engine() {
     let out = run(r#"
@@ -515,18 +532,23 @@ between = ["11.9 N", "12.1 N"]
 /// A knot has a form only where there is one; the words are checked when the scene is read.
 #[test]
 fn form_and_tension_of_the_loop_can_be_asked_for() {
-    let check = |that: &str, equals: &str| format!("{HANGING}\n[[phase]]\nduration = \"20 ms\"\n[[check]]\nthat = \"{that}\"\n{equals}\n");
+    let check = |that: &str, equals: &str| {
+        format!("{HANGING}\n[[phase]]\nduration = \"20 ms\"\n[[check]]\nthat = \"{that}\"\n{equals}\n")
+    };
     assert!(run(&check("form(rod)", "equals = \"none\"")).report.passed);
     assert!(!run(&check("form(rod)", "equals = \"flat\"")).report.passed);
     assert!(!run(&check("loop_tension(rod)", "at_least = \"0 N\"")).report.passed, "what is not there is no number");
     assert!(!run(&check("turning_share(rod)", "at_least = 0")).report.passed);
-    let wrong = |that: &str, word: &str| Scene::parse(&check(that, &format!("equals = \"{word}\"")), "test.toml").unwrap_err().to_string();
+    let wrong = |that: &str, word: &str| {
+        Scene::parse(&check(that, &format!("equals = \"{word}\"")), "test.toml").unwrap_err().to_string()
+    };
     assert!(wrong("form(rod)", "square").contains("no form of a knot is called `square`"));
     assert!(wrong("form(rod)", "capsised").contains("`capsized`"));
     assert!(wrong("knot(rod)", "flat").contains("no knot is called `flat`"));
 }
 
-/// What falls with a drag of 100 1/s comes to 98.1 mm/s in a few hundredths of a second; a phase may take the drag away again.
+/// What falls with a drag of 100 1/s comes to 98.1 mm/s in a few hundredths of a second; a phase may take the drag away
+/// again.
 #[test]
 fn drag_is_a_rate_of_any_size() {
     let out = run(r#"

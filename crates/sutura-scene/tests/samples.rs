@@ -34,4 +34,13 @@ macro_rules! sample_tests {
     ($($name:ident),* $(,)?) => { $(#[test] fn $name() { passes(stringify!($name)); })* };
 }
 
-sample_tests!(elastica_tip_load, elastica_self_weight, catenary, clamped_twist, hanging_chain, hanging_helix, free_thread, capstan);
+sample_tests!(
+    elastica_tip_load,
+    elastica_self_weight,
+    catenary,
+    clamped_twist,
+    hanging_chain,
+    hanging_helix,
+    free_thread,
+    capstan
+);

@@ -57,7 +57,11 @@ fn keys_are_replaced_and_added() {
 fn mistakes_name_the_setting() {
     for (path, value, part) in [
         ("thread.silk.elments", "30", "unknown key (did you mean `elements`?)"),
-        ("thread.slik.elements", "30", "no entry is called `slik`; entries without a name are chosen by number, `[0]` (did you mean `silk`?)"),
+        (
+            "thread.slik.elements",
+            "30",
+            "no entry is called `slik`; entries without a name are chosen by number, `[0]` (did you mean `silk`?)",
+        ),
         ("thread.silk.elements", "many", "found the text \"many\", wanted a whole number"),
         ("thread.silk.elements", "-3", "wanted a whole number"),
         ("solver.substep", "1 mm", "\"1 mm\" is a length, wanted a time"),
@@ -80,7 +84,9 @@ fn mistakes_name_the_setting() {
 #[test]
 fn no_setting_makes_the_reader_panic() {
     for value in ["", "\"", "[", "{", "1\nx = 2", "'''", "\u{0}", "ü", "= 3", "# nothing"] {
-        for path in ["title", "thread.silk.elements", "thread", "phase", "solver.substep", "thread[", "thread]0[", ".", "ü.ö"] {
+        for path in
+            ["title", "thread.silk.elements", "thread", "phase", "solver.substep", "thread[", "thread]0[", ".", "ü.ö"]
+        {
             let _ = read(&[(path, value)]);
         }
     }

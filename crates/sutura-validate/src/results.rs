@@ -118,17 +118,24 @@ impl Row {
         let reference = |i: usize| quantity.reference.get(i.min(quantity.reference.len().saturating_sub(1))).copied();
         let references: Vec<f64> = (0..values.len()).filter_map(reference).collect();
         let scale = |i: usize| quantity.scale.unwrap_or_else(|| references[i].abs());
-        let errors: Vec<Option<f64>> = values.iter().enumerate().map(|(i, v)| references.get(i).map(|r| (v - r) / scale(i))).collect();
+        let errors: Vec<Option<f64>> =
+            values.iter().enumerate().map(|(i, v)| references.get(i).map(|r| (v - r) / scale(i))).collect();
         // The order toward one reference; toward references that differ from run to run there is none.
         let order = if quantity.reference.len() == 1 { order(study, values, &errors, scale(0)) } else { None };
         let last = errors.last().copied().flatten().unwrap_or(f64::NAN).abs();
         let every = |ok: &dyn Fn(f64) -> bool| !values.is_empty() && values.iter().all(|v| ok(*v));
         let met = match quantity.bar {
-            Bar::Within(error) if quantity.reference.len() > 1 => errors.iter().all(|e| e.is_some_and(|e| e.abs() <= error)),
+            Bar::Within(error) if quantity.reference.len() > 1 => {
+                errors.iter().all(|e| e.is_some_and(|e| e.abs() <= error))
+            }
             Bar::Within(error) => last <= error,
             // Without an order the runs agree to rounding.
             Bar::Order(error, least) => last <= error && order.is_none_or(|p| p >= least),
-            Bar::Same(difference) => spread(values) <= difference * quantity.scale.unwrap_or_else(|| values.iter().fold(0.0, |a: f64, v| a.max(v.abs()))),
+            Bar::Same(difference) => {
+                spread(values)
+                    <= difference
+                        * quantity.scale.unwrap_or_else(|| values.iter().fold(0.0, |a: f64, v| a.max(v.abs())))
+            }
             Bar::AtMost(most) => every(&|v| v <= most),
             Bar::AtLeast(least) => every(&|v| v >= least),
         };
@@ -148,18 +155,30 @@ impl Row {
             Some(problems.join("; "))
         };
         let levels = study.levels.iter().map(|l| l.label.clone()).collect();
-        Row { quantity: quantity.name.clone(), source: quantity.source, levels, references, values: values.to_vec(), errors, order, bar, passed, reason }
+        Row {
+            quantity: quantity.name.clone(),
+            source: quantity.source,
+            levels,
+            references,
+            values: values.to_vec(),
+            errors,
+            order,
+            bar,
+            passed,
+            reason,
+        }
     }
 }
 
 /// Largest difference between any two values; not a number if one is.
 fn spread(values: &[f64]) -> f64 {
-    let (low, high) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
     if values.iter().all(|v| v.is_finite()) { high - low } else { f64::NAN }
 }
 
-/// Order of convergence: from the differences between the last three runs where their sizes fall by one ratio, which needs no
-/// reference; from the errors of the last two otherwise.
+/// Order of convergence: from the differences between the last three runs where their sizes fall by one ratio, which
+/// needs no reference; from the errors of the last two otherwise.
 fn order(study: &Study, values: &[f64], errors: &[Option<f64>], scale: f64) -> Option<f64> {
     let ratio = |coarse: f64, fine: f64| if coarse > fine && fine > 0.0 { coarse / fine } else { f64::NAN };
     if let ([.., l0, l1, l2], [.., v0, v1, v2]) = (study.levels.as_slice(), values)
@@ -168,7 +187,9 @@ fn order(study: &Study, values: &[f64], errors: &[Option<f64>], scale: f64) -> O
         let (coarse, fine) = ((v0 - v1) / scale, (v1 - v2) / scale);
         return (fine.abs() > ROUNDING).then(|| (coarse / fine).abs().ln() / ratio(l1.size, l2.size).ln());
     }
-    let ([.., coarse, fine], [.., Some(e_coarse), Some(e_fine)]) = (study.levels.as_slice(), errors) else { return None };
+    let ([.., coarse, fine], [.., Some(e_coarse), Some(e_fine)]) = (study.levels.as_slice(), errors) else {
+        return None;
+    };
     let meaningful = e_fine.abs() > ROUNDING && e_coarse.abs() > ROUNDING && ratio(coarse.size, fine.size).is_finite();
     meaningful.then(|| (e_coarse / e_fine).abs().ln() / ratio(coarse.size, fine.size).ln())
 }
@@ -254,7 +275,9 @@ pub fn markdown(results: &[SectionResult], plots: &str) -> String {
         let reasons: Vec<String> = s
             .rows()
             .filter(|(_, r)| !r.passed)
-            .map(|(study, r)| format!("- {}, {}: {}", study.name, r.quantity, r.reason.as_deref().unwrap_or("reason not known")))
+            .map(|(study, r)| {
+                format!("- {}, {}: {}", study.name, r.quantity, r.reason.as_deref().unwrap_or("reason not known"))
+            })
             .collect();
         if !reasons.is_empty() {
             let _ = write!(out, "\nFailing:\n\n{}\n", reasons.join("\n"));
@@ -284,7 +307,11 @@ fn list(values: &[f64]) -> String {
 /// Anchor of a heading as GitHub makes it.
 fn anchor(s: &SectionResult) -> String {
     let heading = format!("{}. {}", s.number, s.title).to_lowercase();
-    heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).map(|c| if c == ' ' { '-' } else { c }).collect()
+    heading
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c))
+        .map(|c| if c == ' ' { '-' } else { c })
+        .collect()
 }
 
 /// All rows as comma-separated text, one line a run.
@@ -294,7 +321,8 @@ pub fn csv(results: &[SectionResult]) -> String {
     for s in results {
         for (study, r) in s.rows() {
             for (i, value) in r.values.iter().enumerate() {
-                let optional = |v: Option<f64>| v.filter(|v| v.is_finite()).map_or_else(String::new, |v| format!("{v}"));
+                let optional =
+                    |v: Option<f64>| v.filter(|v| v.is_finite()).map_or_else(String::new, |v| format!("{v}"));
                 let _ = writeln!(
                     out,
                     "{},{},{},{},{},{},{},{},{},{},{}",

@@ -30,8 +30,10 @@ struct Measured {
 
 /// Runs all studies of the sections on `jobs` threads; `tell` hears of each run as it is done.
 pub fn run(sections: &[Section], jobs: usize, tell: &(dyn Fn(&Progress) + Sync)) -> Vec<SectionResult> {
-    let work: Vec<(&Section, &Study, &Level)> =
-        sections.iter().flat_map(|s| s.studies.iter().flat_map(move |study| study.levels.iter().map(move |level| (s, study, level)))).collect();
+    let work: Vec<(&Section, &Study, &Level)> = sections
+        .iter()
+        .flat_map(|s| s.studies.iter().flat_map(move |study| study.levels.iter().map(move |level| (s, study, level))))
+        .collect();
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
     let measured: Vec<Mutex<Measured>> = work.iter().map(|_| Mutex::default()).collect();
     std::thread::scope(|scope| {
@@ -53,9 +55,14 @@ pub fn run(sections: &[Section], jobs: usize, tell: &(dyn Fn(&Progress) + Sync))
     let mut measured = measured.into_iter().map(|m| m.into_inner().unwrap_or_default());
     let study = |study: &Study| {
         let runs: Vec<Measured> = measured.by_ref().take(study.levels.len()).collect();
-        let problems: Vec<String> =
-            runs.iter().zip(&study.levels).filter_map(|(run, level)| run.problem.as_ref().map(|p| format!("{}: {p}", level.label))).collect();
-        let values: Vec<Vec<f64>> = (0..study.quantities.len()).map(|q| runs.iter().map(|r| r.values.get(q).copied().unwrap_or(f64::NAN)).collect()).collect();
+        let problems: Vec<String> = runs
+            .iter()
+            .zip(&study.levels)
+            .filter_map(|(run, level)| run.problem.as_ref().map(|p| format!("{}: {p}", level.label)))
+            .collect();
+        let values: Vec<Vec<f64>> = (0..study.quantities.len())
+            .map(|q| runs.iter().map(|r| r.values.get(q).copied().unwrap_or(f64::NAN)).collect())
+            .collect();
         let curve = runs.into_iter().last().unwrap_or_default().curve;
         StudyResult::new(study, &values, &problems, curve)
     };

@@ -54,11 +54,19 @@ fn vector(v: [f64; 3]) -> String {
     format!("[{:e}, {:e}, {:e}]", v[0], v[1], v[2])
 }
 
-/// The same statics with other settings of the solver: a static answer depends on none. `own` is the substep of the scene \[s\].
-fn independence(name: &str, own: f64, mut study: Study, what: &str, measure: impl Fn(&Outcome) -> f64 + Send + Sync + 'static) -> Study {
+/// The same statics with other settings of the solver: a static answer depends on none. `own` is the substep of the
+/// scene \[s\].
+fn independence(
+    name: &str,
+    own: f64,
+    mut study: Study,
+    what: &str,
+    measure: impl Fn(&Outcome) -> f64 + Send + Sync + 'static,
+) -> Study {
     // Short steps damp little by themselves; without more the slow swing would take minutes to die.
     let short = |n: u32| {
-        let settings = [("solver.substep", format!("{:e}", 1.0 / f64::from(n))), ("solver.linear_damping", "0.99".into())];
+        let settings =
+            [("solver.substep", format!("{:e}", 1.0 / f64::from(n))), ("solver.linear_damping", "0.99".into())];
         Level::new(format!("1/{n} s, damping 0.99"), 0.0, &settings)
     };
     let mut levels = vec![
@@ -71,7 +79,11 @@ fn independence(name: &str, own: f64, mut study: Study, what: &str, measure: imp
         Level::new("tolerance 0.003", 0.0, &[("solver.tolerance", "0.003".into())]),
     ];
     for damping in ["0.5", "0.99"] {
-        levels.push(Level::new(format!("damping {damping}"), 0.0, &[("solver.linear_damping", damping.into()), ("solver.angular_damping", damping.into())]));
+        levels.push(Level::new(
+            format!("damping {damping}"),
+            0.0,
+            &[("solver.linear_damping", damping.into()), ("solver.angular_damping", damping.into())],
+        ));
     }
     study.quantities.clear();
     study.curve = None;

@@ -53,7 +53,8 @@ pub type Measure<T> = Box<dyn Fn(&Outcome) -> T + Send + Sync>;
 pub struct Level {
     /// What is varied, for the table: `25`, `1 ms`.
     pub label: String,
-    /// Length or time that goes to zero with refinement, in any unit; zero where runs are not refinements of one another.
+    /// Length or time that goes to zero with refinement, in any unit; zero where runs are not refinements of one
+    /// another.
     pub size: f64,
     /// Values set in the scene for this run.
     pub settings: Vec<(String, String)>,
@@ -124,12 +125,17 @@ impl Study {
     }
     /// One run for each number of elements of a thread.
     pub fn elements(self, thread: &str, counts: &[u32]) -> Study {
-        let level = |n: &u32| Level { label: n.to_string(), size: 1.0 / f64::from(*n), settings: vec![(format!("thread.{thread}.elements"), n.to_string())] };
+        let level = |n: &u32| Level {
+            label: n.to_string(),
+            size: 1.0 / f64::from(*n),
+            settings: vec![(format!("thread.{thread}.elements"), n.to_string())],
+        };
         self.levels(counts.iter().map(level).collect())
     }
     /// One run for each substep \[s\].
     pub fn substeps(self, substeps: &[f64]) -> Study {
-        let level = |h: &f64| Level { label: time(*h), size: *h, settings: vec![("solver.substep".into(), format!("{h:e}"))] };
+        let level =
+            |h: &f64| Level { label: time(*h), size: *h, settings: vec![("solver.substep".into(), format!("{h:e}"))] };
         self.levels(substeps.iter().map(level).collect())
     }
     /// The runs.
@@ -157,13 +163,24 @@ impl Study {
 impl Level {
     /// A run with some values of the scene.
     pub fn new(label: impl Into<String>, size: f64, settings: &[(&str, String)]) -> Level {
-        Level { label: label.into(), size, settings: settings.iter().map(|(path, value)| ((*path).to_string(), value.clone())).collect() }
+        Level {
+            label: label.into(),
+            size,
+            settings: settings.iter().map(|(path, value)| ((*path).to_string(), value.clone())).collect(),
+        }
     }
 }
 
 impl Quantity {
     /// Last value of a probe (`name`, or `name.column`) times a factor.
-    pub fn last(name: impl Into<String>, probe: &'static str, factor: f64, reference: f64, source: &'static str, bar: Bar) -> Quantity {
+    pub fn last(
+        name: impl Into<String>,
+        probe: &'static str,
+        factor: f64,
+        reference: f64,
+        source: &'static str,
+        bar: Bar,
+    ) -> Quantity {
         Quantity::measured(name, move |outcome| factor * last(outcome, probe), vec![reference], source, bar)
     }
     /// Anything read from a run; `reference` is one value, or one a run.
@@ -207,7 +224,11 @@ pub fn series(outcome: &Outcome, probe: &str) -> Vec<(f64, f64)> {
 /// Columns of a series (a probe or profile).
 pub fn columns<const N: usize>(outcome: &Outcome, name: &str, columns: [&str; N]) -> Vec<[f64; N]> {
     let Some(series) = outcome.series.iter().find(|s| s.name == name) else { return Vec::new() };
-    let Some(found) = columns.iter().map(|c| series.columns.iter().position(|(n, _)| n == c)).collect::<Option<Vec<_>>>() else { return Vec::new() };
+    let Some(found) =
+        columns.iter().map(|c| series.columns.iter().position(|(n, _)| n == c)).collect::<Option<Vec<_>>>()
+    else {
+        return Vec::new();
+    };
     series.rows.iter().map(|r| std::array::from_fn(|i| r[found[i]])).collect()
 }
 

@@ -1,5 +1,5 @@
-//! The quick cases of the validation are within their bars, and the list of cases is consistent. The others take the release build:
-//! `sutura validate`.
+//! The quick cases of the validation are within their bars, and the list of cases is consistent. The others take the
+//! release build: `sutura validate`.
 
 use std::collections::BTreeSet;
 use sutura_validate::{Section, csv, markdown, run, scenes, sections};
@@ -18,9 +18,12 @@ fn quick_cases_are_within_their_bars() {
     let missed: Vec<String> = results
         .iter()
         .flat_map(|s| {
-            s.rows()
-                .filter(|(_, r)| !r.passed)
-                .map(|(study, r)| format!("{} {}, {}: {:?} for {:?}, {:?}", s.number, study.name, r.quantity, r.values, r.references, r.reason))
+            s.rows().filter(|(_, r)| !r.passed).map(|(study, r)| {
+                format!(
+                    "{} {}, {}: {:?} for {:?}, {:?}",
+                    s.number, study.name, r.quantity, r.values, r.references, r.reason
+                )
+            })
         })
         .collect();
     assert!(missed.is_empty(), "{missed:#?}");
@@ -48,10 +51,20 @@ fn cases_have_names_of_their_own_and_every_scene_is_used() {
     for section in sections() {
         let mut names = BTreeSet::new();
         for study in &section.studies {
-            assert!(names.insert(study.name.clone()), "section {}: two cases are called `{}`", section.number, study.name);
+            assert!(
+                names.insert(study.name.clone()),
+                "section {}: two cases are called `{}`",
+                section.number,
+                study.name
+            );
             assert!(!study.levels.is_empty() && !study.quantities.is_empty(), "{}", study.name);
             for q in &study.quantities {
-                assert!(q.reference.len() <= 1 || q.reference.len() == study.levels.len(), "{}, {}", study.name, q.name);
+                assert!(
+                    q.reference.len() <= 1 || q.reference.len() == study.levels.len(),
+                    "{}, {}",
+                    study.name,
+                    q.name
+                );
                 assert!(q.reference.iter().all(|r| r.is_finite()), "{}, {}: {:?}", study.name, q.name, q.reference);
             }
             used.extend(Some(study.scene).filter(|s| !s.is_empty()));

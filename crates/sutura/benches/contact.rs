@@ -1,15 +1,19 @@
-//! How the cost of contact grows with its amount: `cargo bench -p sutura --bench contact [-- FAMILY ...]`. CPU time of a frame, the median, the worst and the
-//! first, for each size of a family, and the exponent of the median in the number of contacts over the family.
+//! How the cost of contact grows with its amount: `cargo bench -p sutura --bench contact [-- FAMILY ...]`. CPU time of
+//! a frame, the median, the worst and the first, for each size of a family, and the exponent of the median in the
+//! number of contacts over the family.
 //!
 //! - `floor`: a thread laid on a floor.
-//! - `wound`: a thread wound around a post, one end drawn by a force, the other led; friction that lets it slide whatever the number of turns.
+//! - `wound`: a thread wound around a post, one end drawn by a force, the other led; friction that lets it slide
+//!   whatever the number of turns.
 //! - `twist`: two threads wound about each other, drawn by forces at their ends.
 //! - `threads`: many threads in one world, each wound around a post of its own.
 
 use cpu_time::ThreadTime;
 use std::f64::consts::TAU;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, World};
+use sutura::{
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings, ShapeSpec, World,
+};
 
 const FRAME: f64 = 1.0 / 60.0;
 const RADIUS: f64 = 0.12e-3;
@@ -32,7 +36,12 @@ fn silk() -> Material {
 }
 
 fn world(gravity: f64, mu: f64) -> World {
-    let settings = Settings { gravity: DVec3::NEG_Z * gravity, friction: Friction::coulomb(mu), linear_damping: 0.9, ..Settings::default() };
+    let settings = Settings {
+        gravity: DVec3::NEG_Z * gravity,
+        friction: Friction::coulomb(mu),
+        linear_damping: 0.9,
+        ..Settings::default()
+    };
     World::new(settings).expect("valid settings")
 }
 
@@ -109,7 +118,10 @@ fn main() {
     ];
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let head = ["family", "size", "contacts", "median ms", "worst", "first", "substeps", "Newton"];
-    println!("{:>8} {:>6} {:>9} {:>10} {:>9} {:>9} {:>9} {:>7}", head[0], head[1], head[2], head[3], head[4], head[5], head[6], head[7]);
+    println!(
+        "{:>8} {:>6} {:>9} {:>10} {:>9} {:>9} {:>9} {:>7}",
+        head[0], head[1], head[2], head[3], head[4], head[5], head[6], head[7]
+    );
     for (name, make, sizes) in families.iter().filter(|f| asked.is_empty() || asked.iter().any(|a| a == f.0)) {
         let mut points = Vec::new();
         for size in *sizes {
@@ -118,23 +130,29 @@ fn main() {
             for _ in 0..job.frames {
                 for (grip, way) in &job.led {
                     let pose = job.world.grip_pose(*grip).expect("it holds");
-                    job.world.set_grip_pose(*grip, Pose::new(pose.position + *way * LED, DQuat::IDENTITY)).expect("it holds");
+                    job.world
+                        .set_grip_pose(*grip, Pose::new(pose.position + *way * LED, DQuat::IDENTITY))
+                        .expect("it holds");
                 }
                 let start = ThreadTime::now();
                 let report = job.world.step(FRAME);
                 ms.push(1e3 * start.elapsed().as_secs_f64());
-                (contacts, substeps, newton) = (report.contacts, substeps + report.substeps, newton + report.newton_iterations);
+                (contacts, substeps, newton) =
+                    (report.contacts, substeps + report.substeps, newton + report.newton_iterations);
             }
             let first = ms[0];
             ms.sort_by(f64::total_cmp);
             let (median, worst) = (ms[ms.len() / 2], ms[ms.len() - 1]);
-            println!("{name:>8} {size:>6} {contacts:>9} {median:>10.3} {worst:>9.2} {first:>9.2} {substeps:>9} {newton:>7}");
+            println!(
+                "{name:>8} {size:>6} {contacts:>9} {median:>10.3} {worst:>9.2} {first:>9.2} {substeps:>9} {newton:>7}"
+            );
             points.push((f64::from(contacts.max(1)).ln(), median.ln()));
         }
         // Least squares in logarithms.
         let n = points.len() as f64;
         let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
-        let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+        let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+            / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
         println!("{name:>8} exponent {slope:.2}");
     }
 }

@@ -1,4 +1,5 @@
-//! Cost of the paper's solver: `cargo bench -p sutura --bench paper [-- ELEMENTS...]`. Median CPU time of a frame, one step a frame, and nanoseconds an element and iteration.
+//! Cost of the paper's solver: `cargo bench -p sutura --bench paper [-- ELEMENTS...]`. Median CPU time of a frame, one
+//! step a frame, and nanoseconds an element and iteration.
 
 use core::f64::consts::TAU;
 use cpu_time::ThreadTime;
@@ -22,15 +23,28 @@ fn median(world: &mut World, frames: u32, mut before: impl FnMut(&mut World, f64
 }
 
 fn world(gravity: DVec3, p: PaperSettings) -> World {
-    World::new(Settings { gravity, substep: DT, linear_damping: 0.2, angular_damping: 0.2, solver: Solver::Paper(p), ..Settings::default() })
-        .expect("valid settings")
+    World::new(Settings {
+        gravity,
+        substep: DT,
+        linear_damping: 0.2,
+        angular_damping: 0.2,
+        solver: Solver::Paper(p),
+        ..Settings::default()
+    })
+    .expect("valid settings")
 }
 
 /// Figure 8: 15 cm held at both ends, which move 5 cm against each other and turn once.
 fn turned(elements: usize, p: PaperSettings) -> f64 {
     // A little gravity: what is straight and pressed exactly along itself stays straight.
     let mut world = world(DVec3::NEG_Z * 0.1, p);
-    let spec = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.15, elements, 0.075 / elements as f64, Material::elastic(2e9, 1150.0));
+    let spec = RodSpec::straight(
+        DVec3::ZERO,
+        DVec3::X * 0.15,
+        elements,
+        0.075 / elements as f64,
+        Material::elastic(2e9, 1150.0),
+    );
     let rod = world.insert_rod(&spec).expect("a valid thread");
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Jaw)).expect("a free place");
     let grip = world.insert_grip(&GripSpec::at_once(rod, Place::End, Hold::Jaw)).expect("a free place");
@@ -45,14 +59,18 @@ fn turned(elements: usize, p: PaperSettings) -> f64 {
 fn helix(p: PaperSettings) -> f64 {
     let mut world = world(Settings::default().gravity, p);
     let turns = 15.0 / (TAU * 0.5).hypot(1.0);
-    let spec = RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * 0.5, turns, 1.0, 120, 0.0625, Material::elastic(2e9, 1150.0));
+    let spec =
+        RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * 0.5, turns, 1.0, 120, 0.0625, Material::elastic(2e9, 1150.0));
     let rod = world.insert_rod(&spec).expect("a valid thread");
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).expect("a free place");
     median(&mut world, 300, |_, _| {})
 }
 
 fn main() {
-    println!("{:>8} {:>10} {:>10} {:>5} {:>12} {:>22}", "elements", "iterations", "order", "DDC", "ms a frame", "ns/element/iteration");
+    println!(
+        "{:>8} {:>10} {:>10} {:>5} {:>12} {:>22}",
+        "elements", "iterations", "order", "DDC", "ms a frame", "ns/element/iteration"
+    );
     // `cargo bench` adds an option of its own.
     let given: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let all = given.is_empty();
@@ -69,7 +87,8 @@ fn main() {
     }
     if all {
         for direct_distance in [true, false] {
-            let ms = [5, 10, 20, 40].map(|iterations| helix(PaperSettings { iterations, direct_distance, ..PaperSettings::default() }));
+            let ms = [5, 10, 20, 40]
+                .map(|iterations| helix(PaperSettings { iterations, direct_distance, ..PaperSettings::default() }));
             println!("falling helix, DDC {direct_distance}: {ms:.4?} ms a frame at 5, 10, 20, 40 iterations");
         }
     }

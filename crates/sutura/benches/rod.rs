@@ -1,5 +1,6 @@
-//! Cost of a thread without contact: `cargo bench -p sutura --bench rod [-- ELEMENTS ...]`. Nanoseconds an element of CPU time: the least of
-//! many repeats for the parts of a Newton iteration, the median frame of two seconds for a whole drop.
+//! Cost of a thread without contact: `cargo bench -p sutura --bench rod [-- ELEMENTS ...]`. Nanoseconds an element of
+//! CPU time: the least of many repeats for the parts of a Newton iteration, the median frame of two seconds for a whole
+//! drop.
 
 use cpu_time::ThreadTime;
 use sutura::glam::DVec3;
@@ -34,7 +35,10 @@ fn main() {
     if counts.is_empty() {
         counts = vec![120, 500, 2000];
     }
-    println!("{:>8} {:>9} {:>9} {:>9} {:>12} {:>17}", "elements", "assemble", "factor", "solve", "ms a frame", "ns/element/frame");
+    println!(
+        "{:>8} {:>9} {:>9} {:>9} {:>12} {:>17}",
+        "elements", "assemble", "factor", "solve", "ms a frame", "ns/element/frame"
+    );
     for n in counts {
         let mut world = thread(n);
         let mut ms: Vec<f64> = (0..120)
@@ -51,6 +55,11 @@ fn main() {
         let assemble = least(|| k.assemble()) * each;
         let both = least(|| assert!(std::hint::black_box(k.factor()))) * each;
         let solve = least(|| _ = std::hint::black_box(k.solve())) * each;
-        println!("{n:>8} {assemble:>9.1} {:>9.1} {solve:>9.1} {:>12.4} {:>17.0}", both - assemble, ms[60], 1e6 * ms[60] * each);
+        println!(
+            "{n:>8} {assemble:>9.1} {:>9.1} {solve:>9.1} {:>12.4} {:>17.0}",
+            both - assemble,
+            ms[60],
+            1e6 * ms[60] * each
+        );
     }
 }

@@ -1,18 +1,22 @@
 //! The independent audit: did anything pass through anything, how near did things come, how far did threads stretch.
 //!
-//! It looks only at positions at accepted states, with its own distances and its own search for near pairs, so that it cannot share a
-//! mistake with the contact code. Between two states it takes every particle to move along a straight line. For a shape that turns that can be a
-//! straight line as seen from the shape or from the world: only what crosses on both ways has passed through. (Between two states it turns by
-//! far less than a right angle; where it does not, the two ways have little to do with each other.)
+//! It looks only at positions at accepted states, with its own distances and its own search for near pairs, so that it
+//! cannot share a mistake with the contact code. Between two states it takes every particle to move along a straight
+//! line. For a shape that turns that can be a straight line as seen from the shape or from the world: only what crosses
+//! on both ways has passed through. (Between two states it turns by far less than a right angle; where it does not, the
+//! two ways have little to do with each other.)
 //!
-//! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements with less than
-//!   `pi r` of thread between them are left out.
-//! - Thread through shape: the centerline is inside a solid, or comes within a thousandth of the radius of a mesh's surface.
-//! - Clearance: (distance of centerlines - radii) / mean diameter at the states themselves, 0 touches, negative overlaps; to a shape
-//!   (distance of centerline from surface - radius) / diameter. Only what is nearer than one diameter is looked at.
+//! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements
+//!   with less than `pi r` of thread between them are left out.
+//! - Thread through shape: the centerline is inside a solid, or comes within a thousandth of the radius of a mesh's
+//!   surface.
+//! - Clearance: (distance of centerlines - radii) / mean diameter at the states themselves, 0 touches, negative
+//!   overlaps; to a shape (distance of centerline from surface - radius) / diameter. Only what is nearer than one
+//!   diameter is looked at.
 //!
-//! A thread or shape that appears, or whose number of particles changes, is taken up from its first state on; a thread removed and replaced
-//! by one of the same size and radius in the same slot between two states cannot be told from a move.
+//! A thread or shape that appears, or whose number of particles changes, is taken up from its first state on; a thread
+//! removed and replaced by one of the same size and radius in the same slot between two states cannot be told from a
+//! move.
 
 mod distance;
 
@@ -126,8 +130,8 @@ struct SeenShape {
     alive: bool,
 }
 
-/// Places that are joined at the state at hand: the number of the thread there and the rest arc on it, and up to which way by there elements of the
-/// threads do not touch.
+/// Places that are joined at the state at hand: the number of the thread there and the rest arc on it, and up to which
+/// way by there elements of the threads do not touch.
 #[derive(Debug)]
 struct SeenWeld {
     places: Vec<(usize, f64)>,
@@ -145,7 +149,8 @@ struct RodSlice<'a> {
 
 /// Centerlines nearer than this part of the radius have crossed.
 const TOUCHING: f64 = 1e-3;
-/// A way as seen from a shape that turns counts as straight where it is off by this part of the radius, in at most [`MOST_PIECES`] pieces.
+/// A way as seen from a shape that turns counts as straight where it is off by this part of the radius, in at most
+/// [`MOST_PIECES`] pieces.
 const STRAIGHT: f64 = 1e-2;
 /// See [`STRAIGHT`]: enough for half a turn of a shape of a hundred radii.
 const MOST_PIECES: f64 = 256.0;
@@ -166,7 +171,12 @@ impl Audit {
 
     /// Looks at an accepted state, and at what was swept since the one before.
     pub fn observe(&mut self, view: View<'_>) {
-        let rods = view.rods().map(|r| RodSlice { slot: r.slot(), radius: r.radius(), positions: r.positions(), rest_lengths: r.rest_lengths() });
+        let rods = view.rods().map(|r| RodSlice {
+            slot: r.slot(),
+            radius: r.radius(),
+            positions: r.positions(),
+            rest_lengths: r.rest_lengths(),
+        });
         self.observe_slices(view.time(), rods, view.shapes(), view.welds().map(|w| (w.exempt(), w.places().collect())));
     }
 
@@ -205,9 +215,17 @@ impl Audit {
             if rod.positions.iter().any(|p| !p.is_finite()) {
                 return false;
             }
-            let same = |old: &&SeenRod| old.slot == rod.slot && old.n_particles == n_particles && old.radius.to_bits() == rod.radius.to_bits();
+            let same = |old: &&SeenRod| {
+                old.slot == rod.slot && old.n_particles == n_particles && old.radius.to_bits() == rod.radius.to_bits()
+            };
             let first_before = before.rods.iter().find(same).map(|old| old.first);
-            now.rods.push(SeenRod { slot: rod.slot, radius: rod.radius, first: now.position.len(), n_particles, first_before });
+            now.rods.push(SeenRod {
+                slot: rod.slot,
+                radius: rod.radius,
+                first: now.position.len(),
+                n_particles,
+                first_before,
+            });
             now.position.extend_from_slice(rod.positions);
             let (mut s, mut elongation) = (0.0, 0.0_f64);
             arc.push(0.0);
@@ -237,8 +255,8 @@ impl Audit {
         }
     }
 
-    /// Boxes around what each element swept, grown so that two overlap when the elements are nearer than any before: only then does
-    /// their clearance matter. What crosses overlaps anyway.
+    /// Boxes around what each element swept, grown so that two overlap when the elements are nearer than any before:
+    /// only then does their clearance matter. What crosses overlaps anyway.
     fn refit(&mut self) {
         let grow = 1.0 + self.report.thread_clearance.unwrap_or(1.0).max(-0.9);
         if self.trees.len() < self.now.rods.len() {
@@ -262,9 +280,14 @@ impl Audit {
         // The shortest rest arc from an element to a weld, and whether two elements are near each other by way of one.
         let way = |weld: &SeenWeld, k: usize, e: usize| {
             let (from, to) = (arc[now.rods[k].first + e], arc[now.rods[k].first + e + 1]);
-            weld.places.iter().filter(|p| p.0 == k).map(|p| (p.1 - to).max(from - p.1).max(0.0)).fold(f64::INFINITY, f64::min)
+            weld.places
+                .iter()
+                .filter(|p| p.0 == k)
+                .map(|p| (p.1 - to).max(from - p.1).max(0.0))
+                .fold(f64::INFINITY, f64::min)
         };
-        let joined = |i: usize, e: usize, k: usize, f: usize| welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.exempt);
+        let joined =
+            |i: usize, e: usize, k: usize, f: usize| welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.exempt);
         for (i, rod) in now.rods.iter().enumerate() {
             let apart = core::f64::consts::PI * rod.radius;
             trees[i].pairs(&mut |e, f| {
@@ -301,10 +324,14 @@ impl Audit {
             seen[k].pose = shape.pose;
             seen[k].alive = true;
             for (rod, tree) in now.rods.iter().zip(trees.iter()) {
-                let element = |report: &mut AuditReport, e: usize| thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
+                let element = |report: &mut AuditReport, e: usize| {
+                    thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose)
+                };
                 match &seen[k].bounds {
                     Some(bounds) => {
-                        let reach = bounds.swept(&old_pose.unwrap_or(shape.pose), &shape.pose).grown(near_shape(report, rod.radius));
+                        let reach = bounds
+                            .swept(&old_pose.unwrap_or(shape.pose), &shape.pose)
+                            .grown(near_shape(report, rod.radius));
                         tree.any(&reach, &mut |e| {
                             element(report, e);
                             false
@@ -346,7 +373,14 @@ fn lerp(from: [DVec3; 2], to: [DVec3; 2], t: f64) -> [DVec3; 2] {
     [from[0].lerp(to[0], t), from[1].lerp(to[1], t)]
 }
 
-fn thread_pair(report: &mut AuditReport, now: &Frame, before: &Frame, time: f64, a: (&SeenRod, usize), b: (&SeenRod, usize)) {
+fn thread_pair(
+    report: &mut AuditReport,
+    now: &Frame,
+    before: &Frame,
+    time: f64,
+    a: (&SeenRod, usize),
+    b: (&SeenRod, usize),
+) {
     let (p, q) = (now.element(a.0, a.1), now.element(b.0, b.1));
     let d = segments(p, q);
     let radii = a.0.radius + b.0.radius;
@@ -369,7 +403,16 @@ fn thread_pair(report: &mut AuditReport, now: &Frame, before: &Frame, time: f64,
 }
 
 #[allow(clippy::too_many_arguments)] // One state of an element and one of a shape, now and before.
-fn thread_and_shape(report: &mut AuditReport, time: f64, rod: &SeenRod, e: usize, now: &Frame, before: &Frame, shape: &SeenShape, old_pose: Option<Pose>) {
+fn thread_and_shape(
+    report: &mut AuditReport,
+    time: f64,
+    rod: &SeenRod,
+    e: usize,
+    now: &Frame,
+    before: &Frame,
+    shape: &SeenShape,
+    old_pose: Option<Pose>,
+) {
     let seen_from = |pose: &Pose, x: [DVec3; 2]| x.map(|x| pose.inverse_transform_point(x));
     let x = now.element(rod, e);
     let p = seen_from(&shape.pose, x);
@@ -393,13 +436,22 @@ fn thread_and_shape(report: &mut AuditReport, time: f64, rod: &SeenRod, e: usize
     }
 }
 
-/// Whether a thread crosses a shape that turns when it is the thread that moves along a straight line, as seen from the world. By then it was seen to
-/// cross along a straight line as seen from the shape. What the way between two states was nobody knows: of a thread at rest the one is off by the
-/// height of the arc that the shape turns by, of a thread that is taken along the other.
+/// Whether a thread crosses a shape that turns when it is the thread that moves along a straight line, as seen from the
+/// world. By then it was seen to cross along a straight line as seen from the shape. What the way between two states
+/// was nobody knows: of a thread at rest the one is off by the height of the arc that the shape turns by, of a thread
+/// that is taken along the other.
 fn crosses_in_the_world(shape: &SeenShape, old_pose: &Pose, old_x: [DVec3; 2], x: [DVec3; 2], radius: f64) -> bool {
     let angle = log((shape.pose.orientation * old_pose.orientation.conjugate()).normalize()).length();
-    let far = x.iter().map(|x| x.distance(shape.pose.position)).chain(old_x.iter().map(|x| x.distance(old_pose.position))).fold(0.0, f64::max);
-    let moved = x.iter().zip(&old_x).map(|(x, old)| ((*x - *old) - (shape.pose.position - old_pose.position)).length()).fold(0.0, f64::max);
+    let far = x
+        .iter()
+        .map(|x| x.distance(shape.pose.position))
+        .chain(old_x.iter().map(|x| x.distance(old_pose.position)))
+        .fold(0.0, f64::max);
+    let moved = x
+        .iter()
+        .zip(&old_x)
+        .map(|(x, old)| ((*x - *old) - (shape.pose.position - old_pose.position)).length())
+        .fold(0.0, f64::max);
     // Height of the arc: an eighth of the acceleration in the turning frame.
     let arc = 0.125 * angle * (angle * far + 2.0 * moved);
     let pieces = (arc / (STRAIGHT * radius)).sqrt().ceil().clamp(1.0, MOST_PIECES);
@@ -426,10 +478,18 @@ impl SeenShape {
                 Some(Aabb::around(vertices))
             }
         };
-        SeenShape { slot: shape.slot, pose: shape.pose, geometry: shape.geometry.clone(), bounds, triangles, alive: true }
+        SeenShape {
+            slot: shape.slot,
+            pose: shape.pose,
+            geometry: shape.geometry.clone(),
+            bounds,
+            triangles,
+            alive: true,
+        }
     }
 
-    /// Distance of an element in the shape's frame from its surface, negative inside a solid; of a mesh no more than `near` is looked for.
+    /// Distance of an element in the shape's frame from its surface, negative inside a solid; of a mesh no more than
+    /// `near` is looked for.
     fn distance(&self, p: [DVec3; 2], near: f64) -> f64 {
         let Geometry::Mesh { vertices, triangles } = &self.geometry else {
             let middle = 0.5 * (p[0] + p[1]);
@@ -438,18 +498,21 @@ impl SeenShape {
         };
         let mut least = f64::INFINITY;
         self.triangles.tree.any(&Aabb::around(&p).grown(near), &mut |k| {
-            least = segment_triangle(p, triangles[self.triangles.order[k] as usize].map(|v| vertices[v as usize])).min(least);
+            least = segment_triangle(p, triangles[self.triangles.order[k] as usize].map(|v| vertices[v as usize]))
+                .min(least);
             false
         });
         least
     }
 
-    /// Whether an element whose ends move along straight lines in the shape's frame crosses it: comes inside a solid, or onto the surface of a mesh.
+    /// Whether an element whose ends move along straight lines in the shape's frame crosses it: comes inside a solid,
+    /// or onto the surface of a mesh.
     fn crosses(&self, old: [DVec3; 2], p: [DVec3; 2], radius: f64) -> bool {
         let rate = p[0].distance(old[0]).max(p[1].distance(old[1]));
         let limit = TOUCHING * radius;
         let within = |limit: f64, distance: &dyn Fn([DVec3; 2]) -> f64| {
-            distance(p) - rate <= limit && time_within(&|t| distance(lerp(old, p, t)), rate, limit, TOUCHING * radius).is_some()
+            distance(p) - rate <= limit
+                && time_within(&|t| distance(lerp(old, p, t)), rate, limit, TOUCHING * radius).is_some()
         };
         let Geometry::Mesh { vertices, triangles } = &self.geometry else {
             let middle = 0.5 * (p[0] + p[1]);
@@ -464,8 +527,8 @@ impl SeenShape {
         })
     }
 
-    /// Whether this is the geometry known. A mesh is known by its size and its ends, as comparing all of it at each state would cost
-    /// more than the audit.
+    /// Whether this is the geometry known. A mesh is known by its size and its ends, as comparing all of it at each
+    /// state would cost more than the audit.
     fn is(&self, geometry: &Geometry) -> bool {
         match (&self.geometry, geometry) {
             (Geometry::Mesh { vertices: v, triangles: t }, Geometry::Mesh { vertices: w, triangles: u }) => {
@@ -491,7 +554,8 @@ impl Aabb {
     }
 }
 
-/// The triangles of a mesh in an order that follows space (along a Morton curve), so that a tree over the order is a good one.
+/// The triangles of a mesh in an order that follows space (along a Morton curve), so that a tree over the order is a
+/// good one.
 #[derive(Debug, Default)]
 struct Triangles {
     order: Vec<u32>,
@@ -508,7 +572,9 @@ impl Triangles {
             // Ten bits an axis.
             let cell = (((a + b + c) / 3.0 - bounds.min) / size * 1023.0).clamp(DVec3::ZERO, DVec3::splat(1023.0));
             let cell = [cell.x as u32, cell.y as u32, cell.z as u32];
-            (0..10).fold(0_u32, |code, bit| (0..3).fold(code, |code, axis| code | ((cell[axis] >> bit) & 1) << (3 * bit + axis as u32)))
+            (0..10).fold(0_u32, |code, bit| {
+                (0..3).fold(code, |code, axis| code | ((cell[axis] >> bit) & 1) << (3 * bit + axis as u32))
+            })
         };
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         order.sort_by_cached_key(|t| (place(*t), *t));

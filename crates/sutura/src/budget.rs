@@ -1,15 +1,18 @@
-//! What a substep may not make: angular momentum of threads that nothing holds, and energy of threads that nothing drives. Theory 3.2.
+//! What a substep may not make: angular momentum of threads that nothing holds, and energy of threads that nothing
+//! drives. Theory 3.2.
 //!
-//! Both are kept by correcting velocities at the end of the substep, positions stay. Threads in contact or welded are one group, since they exchange both.
-//! For a group of particles m, x, v and frames I, w (world axes), about its center of mass c with velocity u,
+//! Both are kept by correcting velocities at the end of the substep, positions stay. Threads in contact or welded are
+//! one group, since they exchange both. For a group of particles m, x, v and frames I, w (world axes), about its center
+//! of mass c with velocity u,
 //!
 //! ```text
 //! L = sum m (x - c) x (v - u) + sum I w \[kg m^2/s\],     J = sum m (r^2 - r r^T) + sum I \[kg m^2\],     r = x - c
 //! ```
 //!
-//! a turning by J^-1 dL gives it the angular momentum that it had, with what loads add. What its energy (kinetic, elastic, of gravity and dead loads) has
-//! grown by is taken from the motion of its parts against each other: k of it is left, where the energy is that at the start. Both corrections are of the
-//! order of the error of the method in a substep, so they leave its order. Contact forces have no energy here: what overlap gives back is taken off too.
+//! a turning by J^-1 dL gives it the angular momentum that it had, with what loads add. What its energy (kinetic,
+//! elastic, of gravity and dead loads) has grown by is taken from the motion of its parts against each other: k of it
+//! is left, where the energy is that at the start. Both corrections are of the order of the error of the method in a
+//! substep, so they leave its order. Contact forces have no energy here: what overlap gives back is taken off too.
 
 use crate::integrator::Method;
 use crate::math::Pose;
@@ -26,23 +29,26 @@ use glam::{DMat3, DVec3};
 /// Rounding of an energy, over the energies that it is summed of: some hundred terms of some rounded numbers each.
 const ROUNDING: f64 = 1e-13;
 
-/// Part of the trace of J added to it where it is inverted: a straight thread has next to no inertia about its own axis, and what is off there by the bending
-/// of its parts is not to become spin.
+/// Part of the trace of J added to it where it is inverted: a straight thread has next to no inertia about its own
+/// axis, and what is off there by the bending of its parts is not to become spin.
 const STIFFENED: f64 = 1e-2;
 
 /// Passes that such an inverse is applied in: what is left is some 1e-5 of the error of a substep.
 const PASSES: u32 = 3;
 
-/// Gain of a substep of second order over the energy of the group beyond which it is not resolved in time, and implicit Euler takes it.
+/// Gain of a substep of second order over the energy of the group beyond which it is not resolved in time, and implicit
+/// Euler takes it.
 const UNRESOLVED: f64 = 1e-3;
 
-/// Part of its energy that a group may be left with too much: Newton's iteration leaves some of that in what comes to rest.
+/// Part of its energy that a group may be left with too much: Newton's iteration leaves some of that in what comes to
+/// rest.
 const LEFT: f64 = 1e-9;
 
 /// Elongation of an inextensible thread that no substep leaves: an edit has put work in.
 const EDITED: f64 = 200.0 * LENGTH_TOLERANCE;
 
-/// Energy of a thread that is bent by next to nothing, over that at an angle of one from end to end: rounding of angles and lengths.
+/// Energy of a thread that is bent by next to nothing, over that at an angle of one from end to end: rounding of angles
+/// and lengths.
 const NOTHING: f64 = 1e-9;
 
 /// Way of a grip in a step, in radii, up to which it stands still.
@@ -103,8 +109,17 @@ pub(crate) enum Settled {
     Gained,
 }
 
-/// Takes off the state at the end of a substep what the substep has made, against that at its start, `before`. `last` where no shorter one will be tried.
-pub(crate) fn settle(model: &Model, state: &mut State, scratch: &mut Scratch, before: &State, h: f64, method: Method, last: bool) -> Settled {
+/// Takes off the state at the end of a substep what the substep has made, against that at its start, `before`. `last`
+/// where no shorter one will be tried.
+pub(crate) fn settle(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    before: &State,
+    h: f64,
+    method: Method,
+    last: bool,
+) -> Settled {
     let mut budget = core::mem::take(&mut scratch.budget);
     budget.group(model, state, before);
     let mut settled = Settled::Well;
@@ -113,11 +128,19 @@ pub(crate) fn settle(model: &Model, state: &mut State, scratch: &mut Scratch, be
         if budget.of[root as usize] != root || group.driven || model.rods.at(root).is_none() {
             continue;
         }
-        let rods = || budget.of.iter().enumerate().filter(move |(_, of)| **of == root).filter_map(|(slot, _)| model.rods.at(slot as u32));
+        let rods = || {
+            budget
+                .of
+                .iter()
+                .enumerate()
+                .filter(move |(_, of)| **of == root)
+                .filter_map(|(slot, _)| model.rods.at(slot as u32))
+        };
         if !group.held {
             keep_momentum(model, state, scratch, before, h, method, &rods);
         }
-        // Implicit Euler is left alone where hands hold what touches something: contacts give back what they were pressed with.
+        // Implicit Euler is left alone where hands hold what touches something: contacts give back what they were
+        // pressed with.
         let kept = !(group.gripped && model.settings.integrator == Integrator::ImplicitEuler);
         if !group.twisted && kept {
             match keep_energy(model, state, scratch, before, group.held, last, &rods) {
@@ -254,7 +277,8 @@ fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
             let e = crate::rod::energy(model, s, rod);
             e.kinetic + e.stretch + e.bend + e.twist
         });
-        let give: f64 = rod.elements().filter(|e| model.is_joint(*e)).map(|e| 1.0 / model.bend_stiffness[e].min_element()).sum();
+        let give: f64 =
+            rod.elements().filter(|e| model.is_joint(*e)).map(|e| 1.0 / model.bend_stiffness[e].min_element()).sum();
         scale += was.max(is) + if give > 0.0 { NOTHING / give } else { 0.0 };
         gain += is - was;
         for i in rod.particles() {
@@ -292,8 +316,14 @@ fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     }
 }
 
-/// Work of tensions over what lengths that are constraints may be off, and of contact forces over what they may overlap \[J\]: it comes and goes.
-fn slack<'a, I: Iterator<Item = &'a RodModel> + Clone>(model: &Model, state: &State, before: &State, rods: &impl Fn() -> I) -> f64 {
+/// Work of tensions over what lengths that are constraints may be off, and of contact forces over what they may overlap
+/// \[J\]: it comes and goes.
+fn slack<'a, I: Iterator<Item = &'a RodModel> + Clone>(
+    model: &Model,
+    state: &State,
+    before: &State,
+    rods: &impl Fn() -> I,
+) -> f64 {
     let mut sum = 0.0;
     for rod in rods().filter(|rod| rod.stretch == Stretch::Inextensible) {
         for e in rod.elements() {
@@ -311,8 +341,15 @@ fn slack<'a, I: Iterator<Item = &'a RodModel> + Clone>(model: &Model, state: &St
     sum
 }
 
-/// Slows the motion relative to that of a rigid body until kinetic energy is less by `excess`, or it is that of the rigid body. What is left of the excess.
-fn slow<'a, I: Iterator<Item = &'a RodModel> + Clone>(model: &Model, state: &mut State, rods: &impl Fn() -> I, rigid: Rigid, excess: f64) -> f64 {
+/// Slows the motion relative to that of a rigid body until kinetic energy is less by `excess`, or it is that of the
+/// rigid body. What is left of the excess.
+fn slow<'a, I: Iterator<Item = &'a RodModel> + Clone>(
+    model: &Model,
+    state: &mut State,
+    rods: &impl Fn() -> I,
+    rigid: Rigid,
+    excess: f64,
+) -> f64 {
     // Kinetic energy is a + b k + c k^2 where k of the relative motion is left.
     let (mut b, mut c) = (0.0, 0.0);
     for rod in rods() {
@@ -401,6 +438,7 @@ fn moves(pose: &Pose, target: &Pose, radius: f64) -> bool {
 /// Largest |elongation| of an element whose length is a constraint.
 fn most_elongated(model: &Model, state: &State) -> f64 {
     let rods = model.rods.iter().filter(|(_, r)| r.stretch == Stretch::Inextensible);
-    let elongation = |e: usize| ((state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0).abs();
+    let elongation =
+        |e: usize| ((state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0).abs();
     rods.flat_map(|(_, rod)| rod.elements()).map(elongation).fold(0.0, f64::max)
 }

@@ -31,7 +31,12 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn invalid(what: &'static str, field: impl Into<String>, value: impl core::fmt::Debug, wanted: &'static str) -> Self {
+    pub(crate) fn invalid(
+        what: &'static str,
+        field: impl Into<String>,
+        value: impl core::fmt::Debug,
+        wanted: &'static str,
+    ) -> Self {
         Error::Invalid { what, field: field.into(), value: format!("{value:?}"), wanted }
     }
 }

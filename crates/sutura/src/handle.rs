@@ -1,4 +1,5 @@
-//! Handles: 8-byte names of things in a [`World`](crate::World). Outside the engine only handles are seen, inside only `u32`.
+//! Handles: 8-byte names of things in a [`World`](crate::World). Outside the engine only handles are seen, inside only
+//! `u32`.
 
 use core::marker::PhantomData;
 

@@ -1,10 +1,10 @@
-//! What was done to a world, as data: every insertion, grip, pose, drive, load and step in order, with the state hash after each step. Done
-//! again, in another build or on another machine, the same inputs give the same hash after every step; where they do not, the first step
-//! that differs is known.
+//! What was done to a world, as data: every insertion, grip, pose, drive, load and step in order, with the state hash
+//! after each step. Done again, in another build or on another machine, the same inputs give the same hash after every
+//! step; where they do not, the first step that differs is known.
 //!
-//! A [`Recorder`] is a world that writes down what is done to it. A [`Recording`] can be written, read and replayed. Its inputs are in
-//! order and each step has its length, so what a user does by hand is recorded as well as what a scene does: a grip inserted, its poses
-//! from step to step, its removal.
+//! A [`Recorder`] is a world that writes down what is done to it. A [`Recording`] can be written, read and replayed.
+//! Its inputs are in order and each step has its length, so what a user does by hand is recorded as well as what a
+//! scene does: a grip inserted, its poses from step to step, its removal.
 
 use crate::error::Error;
 use crate::handle::Handle;
@@ -109,8 +109,8 @@ impl Input {
     }
 }
 
-/// A world that writes down what is done to it, if it is to. It reads as the [`World`] that it holds. What ends in an error changes
-/// nothing and is not written down.
+/// A world that writes down what is done to it, if it is to. It reads as the [`World`] that it holds. What ends in an
+/// error changes nothing and is not written down.
 pub struct Recorder {
     world: World,
     recording: Option<Recording>,
@@ -253,14 +253,15 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 4 is the same without the input 23, version 3 also without drag and without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
+/// First bytes of a recording: name and version. Version 4 is the same without the input 23, version 3 also without
+/// drag and without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
 const VERSION: u32 = 5;
 const OLDEST: u32 = 2;
 
 impl Recording {
-    /// Does everything again in a world of its own; `watch` sees it after every step and may stop there. An error is that of an input that
-    /// this build does not take.
+    /// Does everything again in a world of its own; `watch` sees it after every step and may stop there. An error is
+    /// that of an input that this build does not take.
     pub fn replay(&self, watch: &mut dyn FnMut(&Replayed<'_>) -> ControlFlow<()>) -> Result<World, Error> {
         let mut world = World::default();
         let mut step = 0;
@@ -268,7 +269,8 @@ impl Recording {
             let report = input.apply(&mut world)?;
             if let (Some(report), Input::Step(_, recorded)) = (report, input) {
                 step += 1;
-                let replayed = Replayed { step, world: &world, report: &report, recorded: *recorded, found: world.state_hash() };
+                let replayed =
+                    Replayed { step, world: &world, report: &report, recorded: *recorded, found: world.state_hash() };
                 if watch(&replayed).is_break() {
                     break;
                 }
@@ -277,7 +279,8 @@ impl Recording {
         Ok(world)
     }
 
-    /// The first input in which two recordings differ, by its number; where one ends before the other, the end of the shorter.
+    /// The first input in which two recordings differ, by its number; where one ends before the other, the end of the
+    /// shorter.
     pub fn first_difference(&self, other: &Recording) -> Option<usize> {
         let bytes = |input: &Input| {
             let mut out = Vec::new();
@@ -295,7 +298,8 @@ impl Recording {
         steps.fold((0, 0.0), |(n, time), dt| (n + 1, time + dt))
     }
 
-    /// The bytes of a file: `SUTURAIN`, version, inputs (see `docs/formats.md`). The same inputs are the same bytes on any machine.
+    /// The bytes of a file: `SUTURAIN`, version, inputs (see `docs/formats.md`). The same inputs are the same bytes on
+    /// any machine.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut out = MAGIC.to_vec();
         VERSION.put(&mut out);
@@ -311,7 +315,9 @@ impl Recording {
         }
         let version = u32::take(&mut input)?;
         if !(OLDEST..=VERSION).contains(&version) {
-            return Err(damaged(format!("recording of version {version}, this build reads versions {OLDEST} to {VERSION}")));
+            return Err(damaged(format!(
+                "recording of version {version}, this build reads versions {OLDEST} to {VERSION}"
+            )));
         }
         input.version = version;
         let inputs = Vec::take(&mut input)?;
@@ -355,7 +361,8 @@ impl Bytes for ShapeSpec {
         open.put(out);
     }
     fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
-        let (geometry, pose, surface, motion) = (Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?);
+        let (geometry, pose, surface, motion) =
+            (Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?, Bytes::take(input)?);
         // Versions 2 and 3 know no meshes that are refused for their holes.
         let open = if input.version < 4 { true } else { Bytes::take(input)? };
         Ok(ShapeSpec { geometry, pose, surface, motion, open })
@@ -424,7 +431,20 @@ structure!(Friction { stick, slide });
 structure!(Plasticity { yield_curvature, yield_twist, hardening });
 structure!(Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity });
 structure!(Along { size, modulus, density });
-structure!(RodSpec { centerline, frames, rest, radius, section, roll, pretwist, along, material, closure, stretch, surface });
+structure!(RodSpec {
+    centerline,
+    frames,
+    rest,
+    radius,
+    section,
+    roll,
+    pretwist,
+    along,
+    material,
+    closure,
+    stretch,
+    surface
+});
 structure!(Closure { twist });
 structure!(WeldSpec { places, rest });
 structure!(ReelSpec { rod, at_end, law, supply });

@@ -1,15 +1,17 @@
 //! Time integration: what the solves of a substep start from, and the rates that they leave.
 //!
-//! Every solve is one of implicit Euler's form: inertia over `span` squared about the place `target` where the rates known so far lead,
+//! Every solve is one of implicit Euler's form: inertia over `span` squared about the place `target` where the rates
+//! known so far lead,
 //!
 //! ```text
 //! x* = x_n + sum w_j v_j,   v* = v_n + sum w_j a_j,   target = x* + span v*,   a = (x - target) / span^2,   v = v* + span a
 //! ```
 //!
-//! over the rates at the start of the substep and at the end of its first solve. TR-BDF2 (Bank et al. 1985) has two solves of one span: the
-//! trapezoidal rule to the part 2 - sqrt 2 of the substep, then the backward difference formula over both parts. It is of second order, also in what is
-//! stiff (both of its solves end where the motion is), L-stable, and needs nothing of the substep before but accelerations. Where those are
-//! not known the method of Alexander (1977) takes a substep, with the same stability function. Theory 3.1.
+//! over the rates at the start of the substep and at the end of its first solve. TR-BDF2 (Bank et al. 1985) has two
+//! solves of one span: the trapezoidal rule to the part 2 - sqrt 2 of the substep, then the backward difference formula
+//! over both parts. It is of second order, also in what is stiff (both of its solves end where the motion is),
+//! L-stable, and needs nothing of the substep before but accelerations. Where those are not known the method of
+//! Alexander (1977) takes a substep, with the same stability function. Theory 3.1.
 
 use crate::math::{exp, log};
 use crate::model::Model;
@@ -39,9 +41,11 @@ pub(crate) struct Stage {
     pub end: f64,
     /// Time by which its accelerations act on velocities \[s\].
     pub span: f64,
-    /// Weights of the rates at the start of the substep and at the end of the first solve \[s\]; none in implicit Euler.
+    /// Weights of the rates at the start of the substep and at the end of the first solve \[s\]; none in implicit
+    /// Euler.
     pub weights: Option<[f64; 2]>,
-    /// Part of the substep over which the accelerations that are known are continued to its end, for the first iterate; none where they are not known.
+    /// Part of the substep over which the accelerations that are known are continued to its end, for the first iterate;
+    /// none where they are not known.
     known: Option<f64>,
     /// Whether it is the last one of the substep.
     pub last: bool,
@@ -94,8 +98,9 @@ impl Stage {
     }
 }
 
-/// Sets up `target` and `target_frame`, and moves the state to the first iterate: for implicit Euler where its velocity carries it (loads left out:
-/// a light end under load would start far away), else on with the accelerations that are known. `origin` is the state at the start of the substep.
+/// Sets up `target` and `target_frame`, and moves the state to the first iterate: for implicit Euler where its velocity
+/// carries it (loads left out: a light end under load would start far away), else on with the accelerations that are
+/// known. `origin` is the state at the start of the substep.
 pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, origin: &State, stage: &Stage, h: f64) {
     let Some([w0, w1]) = stage.weights else {
         carry_euler(model, state, scratch, h);
@@ -129,16 +134,24 @@ pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, ori
                     if w == 0.0 {
                         DVec3::ZERO
                     } else {
-                        strain::joint_rate([s.orientation[e - 1], s.orientation[e]], [s.angular_velocity[e - 1], s.angular_velocity[e]], half) * (w * k)
+                        strain::joint_rate(
+                            [s.orientation[e - 1], s.orientation[e]],
+                            [s.angular_velocity[e - 1], s.angular_velocity[e]],
+                            half,
+                        ) * (w * k)
                     }
                 };
-                scratch.start_angle[e] =
-                    strain::joint_angle(origin.orientation[e - 1], origin.orientation[e], half) + rate(origin, w0, keep_spin) + rate(state, w1, 1.0);
+                scratch.start_angle[e] = strain::joint_angle(origin.orientation[e - 1], origin.orientation[e], half)
+                    + rate(origin, w0, keep_spin)
+                    + rate(state, w1, 1.0);
             }
         }
         for e in rod.start..rod.end - 1 {
-            let base = exp(rate(1.0, w1, state.angular_velocity[e])) * (exp(rate(keep_spin, w0, origin.angular_velocity[e])) * origin.orientation[e]);
-            let carried = origin.angular_velocity[e] * keep_spin + of(&origin.angular_acceleration, e, w0) + of(&state.angular_acceleration, e, w1);
+            let base = exp(rate(1.0, w1, state.angular_velocity[e]))
+                * (exp(rate(keep_spin, w0, origin.angular_velocity[e])) * origin.orientation[e]);
+            let carried = origin.angular_velocity[e] * keep_spin
+                + of(&origin.angular_acceleration, e, w0)
+                + of(&state.angular_acceleration, e, w1);
             scratch.carried_spin[e] = carried;
             scratch.target_frame[e] = (exp(carried * span) * base).normalize();
             let on = ahead(&origin.angular_acceleration, &state.angular_acceleration, e) * (span * span);
@@ -160,7 +173,8 @@ fn carry_euler(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) 
         for e in rod.start..rod.end - 1 {
             // Only damping asks for it.
             if e > rod.start && model.bend_damping[e] != 0.0 {
-                scratch.start_angle[e] = strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
+                scratch.start_angle[e] =
+                    strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
             }
         }
         for e in rod.start..rod.end - 1 {
@@ -172,7 +186,8 @@ fn carry_euler(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) 
     }
 }
 
-/// Drag times substep beyond which a substep is taken by implicit Euler: split off in halves, drag is off by a 24th of its square.
+/// Drag times substep beyond which a substep is taken by implicit Euler: split off in halves, drag is off by a 24th of
+/// its square.
 const HARD: f64 = 0.5;
 
 fn drags_hard(model: &Model, h: f64) -> bool {
@@ -190,14 +205,15 @@ fn fade(model: &Model, h: f64) -> (f64, f64) {
     (keep(model.settings.linear_damping), keep(model.settings.angular_damping))
 }
 
-/// What half of a substep leaves of linear and angular velocities. Damping acts before and after the motion, half each, which is of second order.
+/// What half of a substep leaves of linear and angular velocities. Damping acts before and after the motion, half each,
+/// which is of second order.
 fn half_damping(model: &Model, h: f64) -> (f64, f64) {
     let (drag, fade) = (drag(model, 0.5 * h), fade(model, 0.5 * h));
     (drag.0 * fade.0, drag.1 * fade.1)
 }
 
-/// By how much heavier it is in a substep of implicit Euler what loses the part 1 - exp(-x) of its velocity: a constant force then leads to the velocity
-/// at which drag balances it, however long the substep.
+/// By how much heavier it is in a substep of implicit Euler what loses the part 1 - exp(-x) of its velocity: a constant
+/// force then leads to the velocity at which drag balances it, however long the substep.
 fn heavier(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { x / -libm::expm1(-x) }
 }
@@ -213,7 +229,8 @@ pub(crate) fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, s
                 state.acceleration[i] = (state.position[i] - scratch.target[i]) * (over * scratch.heavier[0]);
             }
             for e in rod.start..rod.end - 1 {
-                state.angular_acceleration[e] = log(state.orientation[e] * scratch.target_frame[e].conjugate()) * (over * scratch.heavier[1]);
+                state.angular_acceleration[e] =
+                    log(state.orientation[e] * scratch.target_frame[e].conjugate()) * (over * scratch.heavier[1]);
             }
         }
     }
@@ -224,7 +241,8 @@ pub(crate) fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, s
                 state.velocity[i] = (scratch.carried[i] + state.acceleration[i] * stage.span) * keep;
             }
             for e in rod.start..rod.end - 1 {
-                state.angular_velocity[e] = (scratch.carried_spin[e] + state.angular_acceleration[e] * stage.span) * keep_spin;
+                state.angular_velocity[e] =
+                    (scratch.carried_spin[e] + state.angular_acceleration[e] * stage.span) * keep_spin;
             }
         }
         return;
@@ -235,12 +253,14 @@ pub(crate) fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, s
             state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
         }
         for e in rod.start..rod.end - 1 {
-            state.angular_velocity[e] = log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
+            state.angular_velocity[e] =
+                log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
         }
     }
 }
 
-/// Angular velocity of a frame as the motion takes it over at the start of the substep, and at the end of the last solve.
+/// Angular velocity of a frame as the motion takes it over at the start of the substep, and at the end of the last
+/// solve.
 pub(crate) fn spins(model: &Model, origin: &State, state: &State, h: f64, e: usize) -> [DVec3; 2] {
     [origin.angular_velocity[e] * half_damping(model, h).1, state.angular_velocity[e]]
 }
@@ -277,7 +297,10 @@ mod tests {
         for method in [Method::Alexander, Method::TrBdf2] {
             for stage in method.stages(1.0) {
                 let [w0, w1] = stage.weights.unwrap();
-                assert!((w0 + w1 + stage.span - stage.end).abs() < 1e-15, "a constant rate is carried as far as it goes");
+                assert!(
+                    (w0 + w1 + stage.span - stage.end).abs() < 1e-15,
+                    "a constant rate is carried as far as it goes"
+                );
             }
             // exp(k) to second order, and the known constant of the third: 1/6 - 0.0404.
             for k in [1e-2, -1e-2] {

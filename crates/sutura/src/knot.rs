@@ -1,14 +1,16 @@
 //! Which knot is it: recognition from a polyline, closed, held at its ends, or free.
 //!
-//! The polyline is closed, thinned by moves that cannot change the knot (`reduce`), seen from several directions, and each
-//! view is simplified and cut into connected summands (`diagram`). A summand is named only when its invariants and its number
-//! of crossings leave one knot: the square knot shares determinant, signature and Alexander polynomial with 8_20, so it is named
-//! from two summands of three crossings and from nothing else. What is not certain is [`KnotType::Unknown`], with its invariants.
+//! The polyline is closed, thinned by moves that cannot change the knot (`reduce`), seen from several directions, and
+//! each view is simplified and cut into connected summands (`diagram`). A summand is named only when its invariants and
+//! its number of crossings leave one knot: the square knot shares determinant, signature and Alexander polynomial with
+//! 8_20, so it is named from two summands of three crossings and from nothing else. What is not certain is
+//! [`KnotType::Unknown`], with its invariants.
 //!
-//! Also here: writhe and linking number ([`writhe`], [`gauss_linking`]) and the places where a thread enters its knot ([`entries`]).
+//! Also here: writhe and linking number ([`writhe`], [`gauss_linking`]) and the places where a thread enters its knot
+//! ([`entries`]).
 //!
-//! Topology does not tell a flat square knot from one that has capsized into sliding half hitches; [`form`] does, by how the two
-//! strands share the turning.
+//! Topology does not tell a flat square knot from one that has capsized into sliding half hitches; [`form`] does, by
+//! how the two strands share the turning.
 
 mod diagram;
 mod entries;
@@ -30,16 +32,17 @@ use glam::{DQuat, DVec3};
 pub enum Ends {
     /// The last point is joined to the first (which may be given twice).
     Closed,
-    /// Each end goes on along a ray to far away, where the rays are joined: the outward directions at the grips. Any length but zero.
+    /// Each end goes on along a ray to far away, where the rays are joined: the outward directions at the grips. Any
+    /// length but zero.
     Held {
         /// Outward direction at the first point.
         start: DVec3,
         /// Outward direction at the last point.
         end: DVec3,
     },
-    /// Each end goes on along a random ray, chosen anew for each of 24 closures among the directions that lead away from the middle
-    /// of the thread. Where the closures disagree the tails are trimmed, a twentieth of the length from each end at a time and at most
-    /// a quarter; trimming may make an answer certain, it may not change it.
+    /// Each end goes on along a random ray, chosen anew for each of 24 closures among the directions that lead away
+    /// from the middle of the thread. Where the closures disagree the tails are trimmed, a twentieth of the length from
+    /// each end at a time and at most a quarter; trimming may make an answer certain, it may not change it.
     Free,
 }
 
@@ -84,7 +87,8 @@ pub enum KnotType {
     SquareAndThrow(Hand),
     /// Three equal throws.
     ThreeEqualThrows(Hand),
-    /// A double throw of this hand and a square knot: the surgeon's knot with a further throw, each the mirror of the one before.
+    /// A double throw of this hand and a square knot: the surgeon's knot with a further throw, each the mirror of the
+    /// one before.
     SurgeonSquareAndThrow(Hand),
     /// A triple throw alone, 7_1.
     TripleThrow(Hand),
@@ -120,11 +124,13 @@ pub struct Recognition {
     pub determinant: u64,
     /// Signature, negative for right-handed throws.
     pub signature: i32,
-    /// Alexander polynomial from the constant coefficient on, the last one positive; empty when it could not be computed.
+    /// Alexander polynomial from the constant coefficient on, the last one positive; empty when it could not be
+    /// computed.
     pub alexander: Vec<i64>,
     /// Crossings left after simplification, in the simplest view found.
     pub crossings: usize,
-    /// Its prime parts in the order of the tables, such as `3_1 # m3_1`; right-handed ones without `m`, `?` for a part without a name.
+    /// Its prime parts in the order of the tables, such as `3_1 # m3_1`; right-handed ones without `m`, `?` for a part
+    /// without a name.
     pub notation: String,
     /// Views whose invariants are those of the answer.
     pub projections_agreed: u32,
@@ -149,20 +155,25 @@ const AGREEMENT: f64 = 0.9;
 /// Crossings of a summand beyond which its invariants may overflow, and would take long.
 const MOST_CROSSINGS: usize = 32;
 
-/// Recognizes a polyline. `seed` chooses the views and the closures; the same seed gives the same answer. Takes a few milliseconds
-/// for a thousand points. The units of `points` do not matter. Input that cannot be recognized gives [`KnotType::Unknown`] and a
-/// [`Problem`].
+/// Recognizes a polyline. `seed` chooses the views and the closures; the same seed gives the same answer. Takes a few
+/// milliseconds for a thousand points. The units of `points` do not matter. Input that cannot be recognized gives
+/// [`KnotType::Unknown`] and a [`Problem`].
 pub fn recognize(points: &[DVec3], ends: Ends, seed: u64) -> Recognition {
     let directions_fit = match ends {
-        Ends::Held { start, end } => [start, end].iter().all(|d| d.is_finite() && d.length() > 0.0 && d.length().is_finite()),
+        Ends::Held { start, end } => {
+            [start, end].iter().all(|d| d.is_finite() && d.length() > 0.0 && d.length().is_finite())
+        }
         Ends::Closed | Ends::Free => true,
     };
     if !directions_fit || points.iter().any(|p| !p.is_finite()) {
         return Recognition::failed(Problem::NotFinite);
     }
     let mut rng = Rng::new(seed);
-    let Some(chain) = prepared(points, matches!(ends, Ends::Closed)) else { return Recognition::failed(Problem::TooFewPoints) };
-    // A turn of everything brings coordinates that are equal by design (straight and flat pieces) out of the degenerate cases.
+    let Some(chain) = prepared(points, matches!(ends, Ends::Closed)) else {
+        return Recognition::failed(Problem::TooFewPoints);
+    };
+    // A turn of everything brings coordinates that are equal by design (straight and flat pieces) out of the degenerate
+    // cases.
     let turn = rng.rotation();
     let chain: Vec<DVec3> = chain.into_iter().map(|p| turn * p).collect();
     match ends {
@@ -175,8 +186,8 @@ pub fn recognize(points: &[DVec3], ends: Ends, seed: u64) -> Recognition {
     }
 }
 
-/// Neighbors at one place are made one point, and everything is brought to a cube of side two to four. The scale is a power of
-/// two, which keeps the digits. `None` when nothing is left.
+/// Neighbors at one place are made one point, and everything is brought to a cube of side two to four. The scale is a
+/// power of two, which keeps the digits. `None` when nothing is left.
 fn prepared(points: &[DVec3], closed: bool) -> Option<Vec<DVec3>> {
     let b = space::Aabb::around(points);
     let (middle, size) = (0.5 * b.min + 0.5 * b.max, (0.5 * b.max - 0.5 * b.min).max_element());
@@ -192,13 +203,14 @@ fn prepared(points: &[DVec3], closed: bool) -> Option<Vec<DVec3>> {
     (chain.len() >= if closed { 3 } else { 2 } && chain.iter().all(|p| p.is_finite())).then_some(chain)
 }
 
-/// From the last point along its ray, round far outside, and back along the ray of the first point: the points between. Any way
-/// round outside gives the same knot.
+/// From the last point along its ray, round far outside, and back along the ray of the first point: the points between.
+/// Any way round outside gives the same knot.
 fn closing_path(chain: &[DVec3], start: DVec3, end: DVec3) -> Vec<DVec3> {
     const FAR: f64 = 16.0; // In radii of the ball that holds the chain.
     let (first, last) = (chain[0], chain[chain.len() - 1]);
     let between = start + end;
-    let middle = if between.length() > 0.1 { between.normalize() } else { (start - end).normalize().any_orthonormal_vector() };
+    let middle =
+        if between.length() > 0.1 { between.normalize() } else { (start - end).normalize().any_orthonormal_vector() };
     vec![last + end * FAR, middle * (1.5 * FAR), first + start * FAR]
 }
 
@@ -216,7 +228,12 @@ fn recognize_free(chain: &[DVec3], rng: &mut Rng) -> Recognition {
             None if certain => return answer,
             None => untrimmed = Some(answer),
             // The majority of the whole thread's closures, now certain.
-            Some(whole) if certain && whole.determinant == answer.determinant && whole.signature == answer.signature && whole.alexander == answer.alexander => {
+            Some(whole)
+                if certain
+                    && whole.determinant == answer.determinant
+                    && whole.signature == answer.signature
+                    && whole.alexander == answer.alexander =>
+            {
                 return answer;
             }
             Some(_) => {}
@@ -266,11 +283,14 @@ fn random_closures(chain: &[DVec3], rng: &mut Rng) -> Vec<Vec<DVec3>> {
 fn recognize_closures(closures: &[Vec<DVec3>], rng: &mut Rng) -> Recognition {
     let each: Vec<Recognition> = closures.iter().map(|polygon| recognize_closed(polygon.clone(), rng)).collect();
     let same = |a: &Recognition, b: &Recognition| {
-        (a.knot, a.determinant, a.signature, &a.alexander, a.problem) == (b.knot, b.determinant, b.signature, &b.alexander, b.problem)
+        (a.knot, a.determinant, a.signature, &a.alexander, a.problem)
+            == (b.knot, b.determinant, b.signature, &b.alexander, b.problem)
     };
     let agreed = |a: &Recognition| each.iter().filter(|b| same(a, b)).count();
     // Of equal counts the first wins, so that the answer does not depend on chance beyond the seed.
-    let Some(best) = each.iter().rev().max_by_key(|a| agreed(a)) else { return Recognition::failed(Problem::TooFewPoints) };
+    let Some(best) = each.iter().rev().max_by_key(|a| agreed(a)) else {
+        return Recognition::failed(Problem::TooFewPoints);
+    };
     let mut answer = best.clone();
     answer.closures_agreed = agreed(best) as u32;
     answer.closures_total = closures.len() as u32;
@@ -283,13 +303,18 @@ fn recognize_closures(closures: &[Vec<DVec3>], rng: &mut Rng) -> Recognition {
     answer
 }
 
-/// A closed polygon, from several directions. All views must have the same invariants; the name is taken from the simplest.
+/// A closed polygon, from several directions. All views must have the same invariants; the name is taken from the
+/// simplest.
 fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     const MORE_VIEWS: u32 = 20;
     reduce::reduce(&mut polygon, true, &[]);
     if polygon.len() < 6 {
         // No knot has fewer than six sticks.
-        return Recognition { projections_agreed: PROJECTIONS, projections_total: PROJECTIONS, ..Recognition::named(&[], &Invariants::unknot()) };
+        return Recognition {
+            projections_agreed: PROJECTIONS,
+            projections_total: PROJECTIONS,
+            ..Recognition::named(&[], &Invariants::unknot())
+        };
     }
     let mut views: Vec<(Invariants, Vec<Part>)> = Vec::new();
     let mut problem = None;
@@ -304,7 +329,8 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
             }
         }
     }
-    // What could have a name is worth looking at from more sides for a simpler view, which replaces one with the same invariants.
+    // What could have a name is worth looking at from more sides for a simpler view, which replaces one with the same
+    // invariants.
     for _ in 0..MORE_VIEWS {
         if views.iter().any(|v| v.1.iter().all(|p| p.prime.is_some())) || !views.iter().any(|v| could_have_name(&v.0)) {
             break;
@@ -316,7 +342,9 @@ fn recognize_closed(mut polygon: Vec<DVec3>, rng: &mut Rng) -> Recognition {
     }
     let agreed = |v: &Invariants| views.iter().filter(|w| w.0 == *v).count();
     // The simplest of the views on which most agree; one with a name before one without.
-    let best = views.iter().max_by_key(|(v, parts)| (agreed(v), parts.iter().all(|p| p.prime.is_some()), core::cmp::Reverse(crossings(parts))));
+    let best = views.iter().max_by_key(|(v, parts)| {
+        (agreed(v), parts.iter().all(|p| p.prime.is_some()), core::cmp::Reverse(crossings(parts)))
+    });
     let Some((invariants, parts)) = best else { return Recognition::failed(problem.unwrap_or(Problem::Degenerate)) };
     let mut answer = Recognition::named(parts, invariants);
     answer.projections_agreed = agreed(invariants) as u32;
@@ -396,25 +424,33 @@ fn identify(summands: &[Diagram]) -> Result<(Invariants, Vec<Part>), Problem> {
         let invariants = invariants.ok_or(Problem::TooTangled)?;
         sum = sum.sum(&invariants).ok_or(Problem::TooTangled)?;
         match primes_of(&invariants, n) {
-            Some(primes) => parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings() })),
+            Some(primes) => {
+                parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings() }))
+            }
             None => parts.push(Part { prime: None, crossings: n }),
         }
     }
     Ok((sum, parts))
 }
 
-/// The knot with these invariants, when among all knots of at most `n` crossings there is one. With up to nine crossings no other
-/// knot, prime or not, has the determinant and signature of the torus knots below, nor the granny's polynomial with its signature;
-/// up to seven none has the square knot's, which 8_20 shares; with up to ten crossings only the unknot has polynomial 1.
+/// The knot with these invariants, when among all knots of at most `n` crossings there is one. With up to nine
+/// crossings no other knot, prime or not, has the determinant and signature of the torus knots below, nor the granny's
+/// polynomial with its signature; up to seven none has the square knot's, which 8_20 shares; with up to ten crossings
+/// only the unknot has polynomial 1.
 fn primes_of(v: &Invariants, n: usize) -> Option<Vec<Prime>> {
     let turn = if v.signature < 0 { Turn::Right } else { Turn::Left };
-    let alternating = |k: usize| v.alexander.len() == k && v.alexander.iter().enumerate().all(|(i, c)| *c == if i % 2 == 0 { 1 } else { -1 });
+    let alternating = |k: usize| {
+        v.alexander.len() == k && v.alexander.iter().enumerate().all(|(i, c)| *c == if i % 2 == 0 { 1 } else { -1 })
+    };
     match (v.alexander.as_slice(), v.signature.unsigned_abs()) {
         ([1], 0) if n <= 10 => Some(vec![]),
         ([1, -3, 1], 0) if n <= 9 => Some(vec![Prime::FigureEight]),
         ([1, -2, 3, -2, 1], 4) if n <= 9 => Some(vec![Prime::Torus(3, turn); 2]),
         ([1, -2, 3, -2, 1], 0) if n <= 7 => Some(vec![Prime::Torus(3, Turn::Right), Prime::Torus(3, Turn::Left)]),
-        (_, s) if n <= 9 => [3_u8, 5, 7, 9].into_iter().find(|k| alternating((*k).into()) && s == u32::from(k - 1)).map(|k| vec![Prime::Torus(k, turn)]),
+        (_, s) if n <= 9 => [3_u8, 5, 7, 9]
+            .into_iter()
+            .find(|k| alternating((*k).into()) && s == u32::from(k - 1))
+            .map(|k| vec![Prime::Torus(k, turn)]),
         _ => None,
     }
 }
@@ -432,7 +468,9 @@ fn could_be_sum(alexander: &[i64], signature: i64, most: u8) -> bool {
     let figure_eight = || quotient(alexander, &[1, -3, 1]).is_some_and(|rest| could_be_sum(&rest, signature, 0));
     let torus = |n: u8| {
         let polynomial: Vec<i64> = (0..n).map(|i| if i % 2 == 0 { 1 } else { -1 }).collect();
-        quotient(alexander, &polynomial).is_some_and(|rest| [-1, 1].into_iter().any(|hand| could_be_sum(&rest, signature + hand * i64::from(n - 1), n)))
+        quotient(alexander, &polynomial).is_some_and(|rest| {
+            [-1, 1].into_iter().any(|hand| could_be_sum(&rest, signature + hand * i64::from(n - 1), n))
+        })
     };
     [9, 7, 5, 3].into_iter().any(|n| n <= most && torus(n)) || figure_eight()
 }
@@ -470,12 +508,13 @@ impl fmt::Display for Prime {
 }
 
 impl Recognition {
-    /// Whether enough views and closures agree. The invariants are then those of the knot, whether or not it has a name here.
+    /// Whether enough views and closures agree. The invariants are then those of the knot, whether or not it has a name
+    /// here.
     pub fn is_certain(&self) -> bool {
         self.problem.is_none()
     }
-    /// The name of the knot ([`KnotType::name`]). Without one it is `unnamed` where its invariants are certain and leave no knot that has a name
-    /// here, and `unknown` where they are not.
+    /// The name of the knot ([`KnotType::name`]). Without one it is `unnamed` where its invariants are certain and
+    /// leave no knot that has a name here, and `unknown` where they are not.
     pub fn name(&self) -> &'static str {
         if self.knot == KnotType::Unknown && self.is_certain() { "unnamed" } else { self.knot.name() }
     }
@@ -503,7 +542,10 @@ impl Recognition {
         primes.sort_by_key(|p| (p.is_none(), *p));
         let names: Vec<String> = primes.iter().map(|p| p.map_or_else(|| "?".into(), |p| p.to_string())).collect();
         Recognition {
-            knot: primes.into_iter().collect::<Option<Vec<_>>>().map_or(KnotType::Unknown, |p| KnotType::from_primes(&p)),
+            knot: primes
+                .into_iter()
+                .collect::<Option<Vec<_>>>()
+                .map_or(KnotType::Unknown, |p| KnotType::from_primes(&p)),
             determinant: invariants.determinant,
             signature: invariants.signature,
             alexander: invariants.alexander.clone(),
@@ -596,7 +638,9 @@ impl KnotType {
             KnotType::SurgeonGranny(h) => of(h, "surgeon-granny-right", "surgeon-granny-left"),
             KnotType::SquareAndThrow(h) => of(h, "square-and-throw-right", "square-and-throw-left"),
             KnotType::ThreeEqualThrows(h) => of(h, "three-equal-throws-right", "three-equal-throws-left"),
-            KnotType::SurgeonSquareAndThrow(h) => of(h, "surgeon-square-and-throw-right", "surgeon-square-and-throw-left"),
+            KnotType::SurgeonSquareAndThrow(h) => {
+                of(h, "surgeon-square-and-throw-right", "surgeon-square-and-throw-left")
+            }
             KnotType::TripleThrow(h) => of(h, "triple-throw-right", "triple-throw-left"),
             KnotType::QuadrupleThrow(h) => of(h, "quadruple-throw-right", "quadruple-throw-left"),
             KnotType::Throws(_) => "further-throws",
@@ -630,7 +674,9 @@ impl KnotType {
             ([1, 1, 0, 0], [1, 0, 0, 0]) => Some(KnotType::SurgeonSquareAndThrow(hand)),
             _ => None,
         };
-        seen_from(throws.right, throws.left, Hand::Right).or_else(|| seen_from(throws.left, throws.right, Hand::Left)).unwrap_or(KnotType::Throws(throws))
+        seen_from(throws.right, throws.left, Hand::Right)
+            .or_else(|| seen_from(throws.left, throws.right, Hand::Left))
+            .unwrap_or(KnotType::Throws(throws))
     }
 }
 

@@ -1,7 +1,8 @@
-//! Real-time simulator of surgical thread: inextensible Cosserat rods of true physical size that touch, hold by friction and knot.
+//! Real-time simulator of surgical thread: inextensible Cosserat rods of true physical size that touch, hold by
+//! friction and knot.
 //!
-//! SI units throughout; right-handed; no up axis (gravity is a vector). Energy, tension and twist signs: tension is positive when
-//! stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
+//! SI units throughout; right-handed; no up axis (gravity is a vector). Energy, tension and twist signs: tension is
+//! positive when stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
 
 pub mod audit;
 mod budget;

@@ -1,7 +1,7 @@
 //! Rotations and small linear algebra, each convention in one place.
 //!
-//! `log(q)` is the rotation vector (axis times angle, angle in [0, pi]); `exp` is its inverse. A rotation is updated in world
-//! axes, `q <- exp(phi) q`. Transcendental functions come from `libm`, so that the bits agree across machines.
+//! `log(q)` is the rotation vector (axis times angle, angle in [0, pi]); `exp` is its inverse. A rotation is updated in
+//! world axes, `q <- exp(phi) q`. Transcendental functions come from `libm`, so that the bits agree across machines.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -36,7 +36,10 @@ impl Pose {
     }
     /// `self * inner`: the placement of something known in this body's frame.
     pub fn compose(&self, inner: &Pose) -> Pose {
-        Pose { position: self.transform_point(inner.position), orientation: (self.orientation * inner.orientation).normalize() }
+        Pose {
+            position: self.transform_point(inner.position),
+            orientation: (self.orientation * inner.orientation).normalize(),
+        }
     }
     /// The placement that undoes this one.
     pub fn inverse(&self) -> Pose {
@@ -46,7 +49,10 @@ impl Pose {
     /// Between two placements: straight line and shortest constant-rate rotation, `s` in \[0, 1\].
     pub fn interpolate(&self, to: &Pose, s: f64) -> Pose {
         let turn = log(to.orientation * self.orientation.conjugate());
-        Pose { position: self.position + (to.position - self.position) * s, orientation: (exp(turn * s) * self.orientation).normalize() }
+        Pose {
+            position: self.position + (to.position - self.position) * s,
+            orientation: (exp(turn * s) * self.orientation).normalize(),
+        }
     }
     /// Whether every number is finite and the quaternion is a unit one.
     pub(crate) fn is_valid(&self) -> bool {
@@ -54,7 +60,8 @@ impl Pose {
     }
 }
 
-/// Whether a point is somewhere from which distances can be measured: its coordinates are finite, and so are their squares.
+/// Whether a point is somewhere from which distances can be measured: its coordinates are finite, and so are their
+/// squares.
 pub(crate) fn is_place(x: DVec3) -> bool {
     x.length_squared().is_finite()
 }
@@ -74,13 +81,17 @@ pub fn exp(phi: DVec3) -> DQuat {
         let s = 1.0
             - u * (1.0 / 6.0
                 - u * (1.0 / 120.0
-                    - u * (1.0 / 5040.0 - u * (1.0 / 362_880.0 - u * (1.0 / 39_916_800.0 - u * (1.0 / 6_227_020_800.0 - u / 1_307_674_368_000.0))))));
+                    - u * (1.0 / 5040.0
+                        - u * (1.0 / 362_880.0
+                            - u * (1.0 / 39_916_800.0 - u * (1.0 / 6_227_020_800.0 - u / 1_307_674_368_000.0))))));
         let c = 1.0
             - u * (0.5
                 - u * (1.0 / 24.0
                     - u * (1.0 / 720.0
                         - u * (1.0 / 40_320.0
-                            - u * (1.0 / 3_628_800.0 - u * (1.0 / 479_001_600.0 - u * (1.0 / 87_178_291_200.0 - u / 20_922_789_888_000.0)))))));
+                            - u * (1.0 / 3_628_800.0
+                                - u * (1.0 / 479_001_600.0
+                                    - u * (1.0 / 87_178_291_200.0 - u / 20_922_789_888_000.0)))))));
         (0.5 * s, c)
     } else {
         let a = a2.sqrt();
@@ -148,7 +159,8 @@ pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
-/// The rotation of least angle that takes unit vector `a` to unit vector `b`; for opposite vectors half a turn about an axis across `a`.
+/// The rotation of least angle that takes unit vector `a` to unit vector `b`; for opposite vectors half a turn about an
+/// axis across `a`.
 pub fn rotation_arc(a: DVec3, b: DVec3) -> DQuat {
     let w = 1.0 + a.dot(b);
     if w < 1e-12 {
@@ -159,11 +171,15 @@ pub fn rotation_arc(a: DVec3, b: DVec3) -> DQuat {
     DQuat::from_xyzw(v.x, v.y, v.z, w).normalize()
 }
 
-/// A unit quaternion whose third director is the unit vector `t`; the first is the one nearest to `hint`, or any across `t`.
+/// A unit quaternion whose third director is the unit vector `t`; the first is the one nearest to `hint`, or any across
+/// `t`.
 pub fn frame_from_tangent(t: DVec3, hint: DVec3) -> DQuat {
     let across = hint - t * t.dot(hint);
-    let d1 =
-        if across.length_squared() > 1e-12 * hint.length_squared() && hint.length_squared() > 0.0 { across.normalize() } else { t.any_orthonormal_vector() };
+    let d1 = if across.length_squared() > 1e-12 * hint.length_squared() && hint.length_squared() > 0.0 {
+        across.normalize()
+    } else {
+        t.any_orthonormal_vector()
+    };
     DQuat::from_mat3(&DMat3::from_cols(d1, t.cross(d1), t)).normalize()
 }
 
@@ -173,7 +189,8 @@ pub fn half(q: DQuat) -> DQuat {
     exp(log(q) * 0.5)
 }
 
-/// Solves the dense system `a x = b` of `n` rows (row after row) in place by elimination with partial pivoting. False when singular.
+/// Solves the dense system `a x = b` of `n` rows (row after row) in place by elimination with partial pivoting. False
+/// when singular.
 pub(crate) fn solve_dense(a: &mut [f64], b: &mut [f64], n: usize) -> bool {
     for k in 0..n {
         let mut p = k;

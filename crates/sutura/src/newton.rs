@@ -1,9 +1,10 @@
 //! One Newton solve of a substep: assemble the rods, factor, couple by contact, step, until nothing moves.
 //!
-//! The substep minimizes inertia + elastic energy + contact (implicit Euler). Stretch is linearized with its multiplier: the geometric
-//! stiffness uses the tension that the last iteration predicted, not the one of the current strain, which makes the iteration that of
-//! the mixed (dual) form and lets it take turns of a large angle although stretch is 1e8 times stiffer than bending. In
-//! inextensible rods that tension is an unknown of its own, eliminated in its element, whose stiffness is 1e5 EA (theory 7.1).
+//! The substep minimizes inertia + elastic energy + contact (implicit Euler). Stretch is linearized with its
+//! multiplier: the geometric stiffness uses the tension that the last iteration predicted, not the one of the current
+//! strain, which makes the iteration that of the mixed (dual) form and lets it take turns of a large angle although
+//! stretch is 1e8 times stiffer than bending. In inextensible rods that tension is an unknown of its own, eliminated in
+//! its element, whose stiffness is 1e5 EA (theory 7.1).
 
 use crate::math::exp;
 use crate::model::Model;
@@ -22,13 +23,16 @@ pub(crate) const LENGTH_TOLERANCE: f64 = 5e-6;
 
 /// Least part of a step that is taken: a contact met on the way must be met, or the next step does not know of it.
 const SHORTEST: f64 = 0.3;
-/// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is shortened.
+/// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is
+/// shortened.
 const OVERSHOOT: f64 = 0.5;
 
-/// Turn of an iteration over that of the one before beyond which a substep without contacts goes over to the exact matrix.
+/// Turn of an iteration over that of the one before beyond which a substep without contacts goes over to the exact
+/// matrix.
 const SLOW: f64 = 0.3;
 
-/// Part of the stiffness along a step that the positive matrix may have left out where its step is taken for the last one.
+/// Part of the stiffness along a step that the positive matrix may have left out where its step is taken for the last
+/// one.
 const TRUSTED: f64 = 0.1;
 
 /// Move of the last iteration where there are contacts, in radii, that counts as none.
@@ -55,18 +59,20 @@ pub(crate) struct Outcome {
     pub residual: f64,
 }
 
-/// Solves for the end of a motion from `scratch.start`, carried on to `scratch.target` by its velocity; accelerations act over `h`, which in implicit
-/// Euler is the substep. The iterate is in `state`. `last` says that no shorter substep will be tried.
+/// Solves for the end of a motion from `scratch.start`, carried on to `scratch.target` by its velocity; accelerations
+/// act over `h`, which in implicit Euler is the substep. The iterate is in `state`. `last` says that no shorter substep
+/// will be tried.
 pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64, last: bool) -> Outcome {
     let settings = &model.settings;
     carried_forces(model, state, scratch);
     row::couple::begin(scratch);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
-    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other one mostly is as
-    // good, so the exact one has to wait until it is not.
+    // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other
+    // one mostly is as good, so the exact one has to wait until it is not.
     let mut exact = !scratch.rows.is_empty();
     let mut waiting = !exact;
-    // Inextensible elements at a weld have their stiffness in the matrix, and the digits that this costs are those of the next iteration.
+    // Inextensible elements at a weld have their stiffness in the matrix, and the digits that this costs are those of
+    // the next iteration.
     let firm = |rod: u32| model.rods.at(rod).is_some_and(|r| r.stretch == crate::Stretch::Inextensible);
     let least = if model.welds.iter().any(|(_, weld)| weld.members.iter().any(|m| firm(m.rod))) { 2 } else { 1 };
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
@@ -76,7 +82,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
     let (mut way, mut unsolved) = (f64::INFINITY, 0);
     while out.iterations < settings.newton_max && !scratch.exhausted() && !scratch.late() {
         out.iterations += 1;
-        scratch.work += 600.0 * model.mass.len() as f64 + 200.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
+        scratch.work += 600.0 * model.mass.len() as f64
+            + 200.0 * (scratch.candidates.threads.len() + scratch.candidates.shapes.len()) as f64;
         row::shape::review(model, state, scratch, out.iterations == 1);
         brake::review(model, state, &mut scratch.brakes);
         row::couple::zones(scratch);
@@ -90,8 +97,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
             if first || taken < 0.2 || gained <= 0.0 || gained.is_nan() {
                 break;
             }
-            // Where the force along the last step has turned round the step went too far: contacts opened, closed or began to slide on
-            // the way. Go back to where a straight line between the two forces says that it vanishes.
+            // Where the force along the last step has turned round the step went too far: contacts opened, closed or
+            // began to slide on the way. Go back to where a straight line between the two forces says that it vanishes.
             let left = work_left(model, state, scratch);
             if left > -OVERSHOOT * gained {
                 break;
@@ -119,7 +126,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         if waiting && (!trusted || out.turn > SLOW * before || !scratch.rows.is_empty()) {
             (waiting, exact) = (false, true);
         }
-        out.residual = max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
+        out.residual =
+            max_or_nan(out.residual, slid / model.rods.iter().map(|(_, r)| r.radius).fold(f64::INFINITY, f64::min));
         if !(out.turn.is_finite() && out.residual.is_finite()) {
             out.finite = false;
             return out;
@@ -137,7 +145,10 @@ pub(crate) fn solve(model: &Model, state: &mut State, scratch: &mut Scratch, h: 
         // What the next iteration would do, going by what this one did after the one before.
         let rate = if first { 1.0 } else { (out.turn / before).max(out.residual / moved_before).clamp(SLACKEN, 1.0) };
         (before, moved_before) = (out.turn, out.residual);
-        let rests = trusted && scale >= 1.0 && out.turn * rate < settings.tolerance && (scratch.rows.is_empty() || out.residual * rate < NEAR);
+        let rests = trusted
+            && scale >= 1.0
+            && out.turn * rate < settings.tolerance
+            && (scratch.rows.is_empty() || out.residual * rate < NEAR);
         if rests
             && out.iterations >= least.min(settings.newton_max)
             && length_error(model, state, scratch) <= LENGTH_TOLERANCE
@@ -196,7 +207,8 @@ fn work_of_excess(model: &Model, state: &State, scratch: &Scratch, excess: impl 
     elements.map(on).sum()
 }
 
-/// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds up.
+/// Work of the forces along the step to come, over its full length, without the stretch and shear forces that it builds
+/// up.
 fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let built_up = |e: usize, change: DVec3| {
         let axial = scratch.axial(model, e).0;
@@ -206,8 +218,9 @@ fn work_ahead(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     work(scratch) - work_of_excess(model, state, scratch, built_up)
 }
 
-/// Work of the forces at the iterate along the last step, with the stretch and shear forces that the step predicted: those of the strain itself hold an
-/// error of second order in the turn, which the next step takes away and which outweighs all else.
+/// Work of the forces at the iterate along the last step, with the stretch and shear forces that the step predicted:
+/// those of the strain itself hold an error of second order in the turn, which the next step takes away and which
+/// outweighs all else.
 fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let error = |e: usize, _| {
         let (axial, at_rest) = scratch.axial(model, e);
@@ -219,7 +232,14 @@ fn work_left(model: &Model, state: &State, scratch: &Scratch) -> f64 {
 }
 
 /// Assembles and factors. False when a pivot is not positive.
-pub(crate) fn factor(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, first: bool) -> bool {
+pub(crate) fn factor(
+    model: &Model,
+    state: &State,
+    scratch: &mut Scratch,
+    h: f64,
+    hessian: Hessian,
+    first: bool,
+) -> bool {
     assemble(model, state, scratch, h, hessian);
     brake::assemble(model, state, scratch);
     row::shape::assemble(model, state, scratch, first);
@@ -252,7 +272,8 @@ fn restrict(state: &State, scratch: &mut Scratch) {
     }
 }
 
-/// Leaves in `scratch.rhs`, at the grips, the force and torque that each node lacks for balance without its grip: minus what the grip exerts.
+/// Leaves in `scratch.rhs`, at the grips, the force and torque that each node lacks for balance without its grip: minus
+/// what the grip exerts.
 pub(crate) fn unbalanced(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
     for (_, grip) in state.grips.iter() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
@@ -282,9 +303,11 @@ fn unbalanced_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64
     assemble_blocks(model, state, scratch, h, &rod.particles(), held);
 }
 
-/// Factor on the update: no element turns by more than 0.3 rad in an iteration, and no pair of threads gets closer than half its gap.
+/// Factor on the update: no element turns by more than 0.3 rad in an iteration, and no pair of threads gets closer than
+/// half its gap.
 fn limit(state: &State, scratch: &Scratch) -> f64 {
-    let turn = scratch.step.iter().skip(1).step_by(2).map(|v| v.length_squared()).fold(weld_turn(scratch), max_or_nan).sqrt();
+    let turn =
+        scratch.step.iter().skip(1).step_by(2).map(|v| v.length_squared()).fold(weld_turn(scratch), max_or_nan).sqrt();
     let by_turn = if turn > 0.3 { 0.3 / turn } else { 1.0 };
     by_turn.min(row::thread::limit(state, scratch, by_turn))
 }
@@ -301,8 +324,8 @@ fn max_or_nan(a: f64, b: f64) -> f64 {
     if b <= a || a.is_nan() { a } else { b }
 }
 
-/// Whether the positive matrix leaves out too much of the exact one along the last step, over inertia and bending there. (Stretch and shear
-/// do not count: their rounding alone can outweigh a slow motion near buckling.)
+/// Whether the positive matrix leaves out too much of the exact one along the last step, over inertia and bending
+/// there. (Stretch and shear do not count: their rounding alone can outweigh a slow motion near buckling.)
 fn neglects(model: &Model, state: &State, scratch: &Scratch, h: f64) -> bool {
     let step = &scratch.step;
     let (mut out, mut kept) = (0.0, 0.0);
@@ -363,7 +386,8 @@ fn apply(model: &Model, state: &mut State, scratch: &mut Scratch, scale: f64, an
     rows.sliders.apply(state, &rows.border, scale)
 }
 
-/// Largest elongation by which an element of an inextensible thread is off what its tension makes it: a second-order error of the turn that Newton just made.
+/// Largest elongation by which an element of an inextensible thread is off what its tension makes it: a second-order
+/// error of the turn that Newton just made.
 fn length_error(model: &Model, state: &State, scratch: &Scratch) -> f64 {
     let mut worst = 0.0;
     for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {

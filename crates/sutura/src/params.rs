@@ -1,5 +1,5 @@
-//! Settings of a world and the tolerances that stages of the step share. Lengths that the solver compares with are multiples of the smallest
-//! thread radius; nothing here is an absolute length.
+//! Settings of a world and the tolerances that stages of the step share. Lengths that the solver compares with are
+//! multiples of the smallest thread radius; nothing here is an absolute length.
 
 use crate::error::{Error, check};
 use glam::DVec3;
@@ -13,15 +13,16 @@ pub struct Settings {
     pub substep: f64,
     /// Newton iterations in a substep before it is given up and halved, >= 1. Default 12.
     pub newton_max: u32,
-    /// A substep has converged when Newton's next iteration is expected to turn no element by more than this \[rad\], going by the last two. The
-    /// error left is of the order of its square. Default 0.003.
+    /// A substep has converged when Newton's next iteration is expected to turn no element by more than this \[rad\],
+    /// going by the last two. The error left is of the order of its square. Default 0.003.
     pub tolerance: f64,
     /// Linear damping d_v in [0, 1): velocities lose this fraction in a second, whatever the step. Default 0.
     pub linear_damping: f64,
     /// Angular damping d_a in [0, 1), per second. Default 0.
     pub angular_damping: f64,
-    /// Linear drag c_v \[1/s\], >= 0: a force -c_v m v, by which a velocity falls to exp(-c_v t) of itself and what falls comes to g / c_v, whatever the substep.
-    /// It adds to the damping, which is a drag of -ln(1 - d_v). Default 0.
+    /// Linear drag c_v \[1/s\], >= 0: a force -c_v m v, by which a velocity falls to exp(-c_v t) of itself and what
+    /// falls comes to g / c_v, whatever the substep. It adds to the damping, which is a drag of -ln(1 - d_v). Default
+    /// 0.
     pub linear_drag: f64,
     /// Angular drag c_a \[1/s\], >= 0, on the spin of cross-sections. Default 0.
     pub angular_drag: f64,
@@ -41,9 +42,10 @@ pub enum Solver {
     /// Whole threads at once, with physical moduli and forces.
     #[default]
     Direct,
-    /// That of the 2018 paper, kept as published for comparison. Of the other settings it uses gravity, substep (one step a frame is the paper's) and
-    /// damping; of a thread its geometry, rest shape and mass. It knows no forces. Welds, reels, plastic set, and grips and shapes driven by force are not in it:
-    /// then nothing moves and the report says so; [`World::set_settings`](crate::World::set_settings) does not switch to it where they are.
+    /// That of the 2018 paper, kept as published for comparison. Of the other settings it uses gravity, substep (one
+    /// step a frame is the paper's) and damping; of a thread its geometry, rest shape and mass. It knows no forces.
+    /// Welds, reels, plastic set, and grips and shapes driven by force are not in it: then nothing moves and the report
+    /// says so; [`World::set_settings`](crate::World::set_settings) does not switch to it where they are.
     Paper(PaperSettings),
 }
 
@@ -62,8 +64,9 @@ pub struct PaperSettings {
     pub direct_distance: bool,
     /// Strength of friction k in [0, 1]. Default 1.
     pub friction: f64,
-    /// Moment of inertia of an element over its mass and squared length, > 0. The paper does not name its own. Default 64: masses and inertias of 1, as
-    /// its equation (15) has them, at the size at which its elongations come out (elements of 1/8 of a unit). A slender bar is 1/12.
+    /// Moment of inertia of an element over its mass and squared length, > 0. The paper does not name its own. Default
+    /// 64: masses and inertias of 1, as its equation (15) has them, at the size at which its elongations come out
+    /// (elements of 1/8 of a unit). A slender bar is 1/12.
     pub frame_inertia: f64,
     /// Default natural, the paper's.
     pub order: SweepOrder,
@@ -111,11 +114,13 @@ impl PaperSettings {
 /// How motion is integrated in time. Where things come to rest does not depend on it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Integrator {
-    /// First order: a motion of angular frequency w loses about w^2 h / 2 of its amplitude per second. One solve a substep.
+    /// First order: a motion of angular frequency w loses about w^2 h / 2 of its amplitude per second. One solve a
+    /// substep.
     #[default]
     ImplicitEuler,
-    /// Second order (TR-BDF2): it loses about w^4 h^3 / 270 per second, and swings slower by the part w^2 h^2 / 25. Two solves a substep. A substep in which contacts open, close, begin to slide or
-    /// to stick goes by implicit Euler, and so does the next one.
+    /// Second order (TR-BDF2): it loses about w^4 h^3 / 270 per second, and swings slower by the part w^2 h^2 / 25. Two
+    /// solves a substep. A substep in which contacts open, close, begin to slide or to stick goes by implicit Euler,
+    /// and so does the next one.
     TrBdf2,
 }
 
@@ -158,8 +163,8 @@ impl Default for Settings {
     }
 }
 
-/// Depth, in sums of radii, up to which a contact of two threads is a linear spring; beyond, it follows Hertz. Without it a light contact would be the
-/// softer the lighter it is, and a sudden load would find it soft.
+/// Depth, in sums of radii, up to which a contact of two threads is a linear spring; beyond, it follows Hertz. Without
+/// it a light contact would be the softer the lighter it is, and a sudden load would find it soft.
 pub(crate) const LIGHT: f64 = 0.005;
 
 /// Normal force over E r^2 beyond which a contact with a shape that stays as it is goes into the rods' matrix.
@@ -167,24 +172,27 @@ pub(crate) const FIRM: f64 = 1e-8;
 
 /// How far beyond the predicted motion candidates are sought, in radii.
 pub(crate) const REACH: f64 = 1.5;
-/// Overlap, in sums of radii, beyond which a substep that brought two things nearer is rejected. The bar of the sample scenes is 0.05.
+/// Overlap, in sums of radii, beyond which a substep that brought two things nearer is rejected. The bar of the sample
+/// scenes is 0.05.
 pub(crate) const OVERLAP: f64 = 0.04;
 /// Overlap that no approach may go beyond.
 const DEEPEST: f64 = 0.05;
 
-/// Overlap, force or not, that no approach may go beyond: centerlines stay farther apart than [`PASS`], and out of shapes.
+/// Overlap, force or not, that no approach may go beyond: centerlines stay farther apart than [`PASS`], and out of
+/// shapes.
 const LIMIT: f64 = 0.35;
 
-/// Whether a motion from one clearance to another, both in sums of radii, is one that overlaps too much, beyond the depth to which the contact's own
-/// force presses. What approaches by next to nothing (the contact solve leaves that much) may go on up to [`DEEPEST`]: many short substeps would add up.
+/// Whether a motion from one clearance to another, both in sums of radii, is one that overlaps too much, beyond the
+/// depth to which the contact's own force presses. What approaches by next to nothing (the contact solve leaves that
+/// much) may go on up to [`DEEPEST`]: many short substeps would add up.
 pub(crate) fn overlaps(before: f64, now: f64, pressed: f64) -> bool {
     let pressed = pressed.min(LIMIT - DEEPEST);
     let room = ((DEEPEST + pressed + now) / (DEEPEST - OVERLAP)).clamp(0.0, 1.0);
     now < -OVERLAP - pressed && now < before - (1e-6 + 2e-4 * room)
 }
 
-/// Overlap, in sums of radii, from which on it is told of what was put there: more than loaded contacts come to, and than the chords of a thread that is led
-/// around something cut off.
+/// Overlap, in sums of radii, from which on it is told of what was put there: more than loaded contacts come to, and
+/// than the chords of a thread that is led around something cut off.
 pub(crate) const PRESSED: f64 = 0.1;
 
 /// Distance of centerlines, in sums of radii, that no motion may go below on its way.
@@ -193,7 +201,8 @@ pub(crate) const PASS: f64 = 0.3;
 /// The same of a centerline from a shape, in radii. A thread may be pressed to 0.3 (see `LIMIT`).
 pub(crate) const PASS_SHAPE: f64 = 0.2;
 
-/// Distance kept between centerlines beyond the sum of radii, in sums of radii; half of the overlap tolerance in reserve.
+/// Distance kept between centerlines beyond the sum of radii, in sums of radii; half of the overlap tolerance in
+/// reserve.
 pub(crate) const KEEP: f64 = 0.02;
 /// How much nearer than that Newton's answer may bring two pieces before another contact is added.
 pub(crate) const SLACK: f64 = 0.03;
@@ -217,22 +226,25 @@ pub(crate) const SAME_PATCH: f64 = 0.9;
 pub(crate) const RECOVER: f64 = 0.8;
 /// Part of the depth to which its force presses a contact that it may lie deeper, to count half as one that overlaps.
 pub(crate) const UNEXPLAINED: f64 = 0.2;
-/// Residual of the contact solve, in radii. A light contact with a shape lies some 1e-4 radii deep: what leaves more does not find its force.
+/// Residual of the contact solve, in radii. A light contact with a shape lies some 1e-4 radii deep: what leaves more
+/// does not find its force.
 pub(crate) const CONTACT_TOLERANCE: f64 = 1e-5;
 /// What a contact force in a rod's matrix may be off, over the largest of a shape on the same rod.
 pub(crate) const OFF_BALANCE: f64 = 2e-3;
 /// Newton iterations after which a contact may be off by more, if it moves by less than `SLIP`.
 pub(crate) const FRONT: u32 = 3;
-/// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less evens out forces
-/// between contacts that together hold.
+/// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less
+/// evens out forces between contacts that together hold.
 pub(crate) const SLIP: f64 = 1e-3;
-/// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two factorizations. (One that is cut short
-/// has friction that does not hold yet: in a rope of threads that feeds itself from substep to substep.)
+/// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two
+/// factorizations. (One that is cut short has friction that does not hold yet: in a rope of threads that feeds itself
+/// from substep to substep.)
 pub(crate) const CONTACT_WORK: f64 = 3e6;
-/// Multiplications that a contact solve may spend where its matrix is sparse. That is dozens of factorizations: with eight a twist of
-/// 200 contacts did not come to its end.
+/// Multiplications that a contact solve may spend where its matrix is sparse. That is dozens of factorizations: with
+/// eight a twist of 200 contacts did not come to its end.
 pub(crate) const SPARSE_WORK: f64 = 3e8;
-/// Work that a substep with all its halves may take, in rough counts of multiplications, so a minute or so. No sample scene reaches it. What takes more will not come to an end in any time worth waiting for: the world counts as stuck.
+/// Work that a substep with all its halves may take, in rough counts of multiplications, so a minute or so. No sample
+/// scene reaches it. What takes more will not come to an end in any time worth waiting for: the world counts as stuck.
 pub(crate) const SUBSTEP_WORK: f64 = 5e10;
 /// Residual of the contact solve beyond which a Newton iteration does not count as converged, in radii.
 pub(crate) const CONTACT_LEFT: f64 = 0.06;
@@ -245,9 +257,27 @@ impl Settings {
         }
         check(what, "substep", self.substep, self.substep > 0.0, "a finite time > 0 [s]")?;
         check(what, "newton_max", f64::from(self.newton_max), self.newton_max >= 1, "at least 1")?;
-        check(what, "tolerance", self.tolerance, self.tolerance > 0.0 && self.tolerance <= 0.1, "a number in (0, 0.1]")?;
-        check(what, "linear_damping", self.linear_damping, (0.0..1.0).contains(&self.linear_damping), "a number in [0, 1)")?;
-        check(what, "angular_damping", self.angular_damping, (0.0..1.0).contains(&self.angular_damping), "a number in [0, 1)")?;
+        check(
+            what,
+            "tolerance",
+            self.tolerance,
+            self.tolerance > 0.0 && self.tolerance <= 0.1,
+            "a number in (0, 0.1]",
+        )?;
+        check(
+            what,
+            "linear_damping",
+            self.linear_damping,
+            (0.0..1.0).contains(&self.linear_damping),
+            "a number in [0, 1)",
+        )?;
+        check(
+            what,
+            "angular_damping",
+            self.angular_damping,
+            (0.0..1.0).contains(&self.angular_damping),
+            "a number in [0, 1)",
+        )?;
         check(what, "linear_drag", self.linear_drag, self.linear_drag >= 0.0, "a finite rate >= 0 [1/s]")?;
         check(what, "angular_drag", self.angular_drag, self.angular_drag >= 0.0, "a finite rate >= 0 [1/s]")?;
         check(what, "halvings", f64::from(self.halvings), self.halvings <= 12, "at most 12")?;

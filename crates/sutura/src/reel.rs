@@ -1,5 +1,5 @@
-//! Length fed in and drawn back. The rest length of the last element at a reel is State; what the model says of that element follows from it, and
-//! elements are cut in two or joined between substeps.
+//! Length fed in and drawn back. The rest length of the last element at a reel is State; what the model says of that
+//! element follows from it, and elements are cut in two or joined between substeps.
 
 use crate::handle::Slots;
 use crate::model::Model;
@@ -9,7 +9,8 @@ use crate::model::rod::RodModel;
 use crate::rod::brake::Brake;
 use crate::state::{LoadState, ReelState, ShapeContact, State, ThreadContact};
 
-/// Lengths of the last element, over its length when the reel was set up, beyond which it is cut and below which it is joined with the next.
+/// Lengths of the last element, over its length when the reel was set up, beyond which it is cut and below which it is
+/// joined with the next.
 const LONGEST: f64 = 1.6;
 const SHORTEST: f64 = 0.4;
 /// Where it cannot be joined it is not drawn back beyond this.
@@ -89,7 +90,8 @@ pub(crate) fn follow(model: &mut Model, state: &State) {
     }
 }
 
-/// Cuts and joins elements at reels, with regard to what the next `h` draws back. True when there is another number of them now.
+/// Cuts and joins elements at reels, with regard to what the next `h` draws back. True when there is another number of
+/// them now.
 pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
     let mut changed = false;
     for slot in 0..state.reels.len() as u32 {
@@ -107,7 +109,11 @@ pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
                 let rod = reel.rod;
                 split_state(model, state, slot, e, first);
                 split_model(model, rod, e);
-            } else if length - drawn < SHORTEST * nominal && n > 2 && model.weld_of[inner].is_none() && !held(model, state, inner) {
+            } else if length - drawn < SHORTEST * nominal
+                && n > 2
+                && model.weld_of[inner].is_none()
+                && !held(model, state, inner)
+            {
                 let (rod, at_end) = (reel.rod, reel.at_end);
                 merge_state(model, state, slot, inner - 1, at_end);
                 merge_model(model, rod, inner - 1);
@@ -141,16 +147,24 @@ pub(crate) fn added(state: &State, rod: u32, at_end: bool) -> i32 {
     state.reels.iter().map(|(_, r)| r).find(|r| r.rod == rod && r.at_end == at_end).map_or(0, |r| r.added)
 }
 
-/// Whether a reel can work on a rod: elements at its ends are cut and joined as if they were all alike, of whatever material.
+/// Whether a reel can work on a rod: elements at its ends are cut and joined as if they were all alike, of whatever
+/// material.
 pub(crate) fn suits(model: &Model, rod: &RodModel) -> bool {
     let first = rod.first as usize;
-    rod.n_elements >= 2 && rod.elements().all(|k| model.factors[k] == model.factors[first] && model.rest_half[k] == glam::DQuat::IDENTITY)
+    rod.n_elements >= 2
+        && rod
+            .elements()
+            .all(|k| model.factors[k] == model.factors[first] && model.rest_half[k] == glam::DQuat::IDENTITY)
 }
 
-/// Whether a state read from outside has lengths and reels that the model, which now fits the state `from`, can be made to fit.
+/// Whether a state read from outside has lengths and reels that the model, which now fits the state `from`, can be made
+/// to fit.
 pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'static str> {
     for (_, reel) in to.reels.iter() {
-        let numbers = reel.nominal.is_finite() && reel.nominal > 0.0 && reel.fed.is_finite() && reel.supply.is_none_or(|s| s.is_finite() && s >= 0.0);
+        let numbers = reel.nominal.is_finite()
+            && reel.nominal > 0.0
+            && reel.fed.is_finite()
+            && reel.supply.is_none_or(|s| s.is_finite() && s >= 0.0);
         let rod = model.rods.at(reel.rod).ok_or("a reel is at a thread that is not here")?;
         let alone = to.reels.iter().filter(|(_, r)| (r.rod, r.at_end) == (reel.rod, reel.at_end)).count() == 1;
         let brake = matches!(reel.law, ReelLaw::Brake(_)) && rod.stretch == crate::Stretch::Inextensible;
@@ -163,10 +177,14 @@ pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'sta
     let mut rods: Vec<_> = model.rods.iter().collect();
     rods.sort_unstable_by_key(|(_, r)| r.first);
     for (slot, rod) in rods {
-        let more = [false, true].map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end)));
+        let more =
+            [false, true].map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end)));
         let now = i64::from(rod.n_elements);
         let least = if to.reels.iter().any(|(_, r)| r.rod == slot) { 2 } else { 1 };
-        let n = usize::try_from(now + more[0] + more[1]).ok().filter(|n| *n >= least).ok_or("a reel has drawn back more than there is")?;
+        let n = usize::try_from(now + more[0] + more[1])
+            .ok()
+            .filter(|n| *n >= least)
+            .ok_or("a reel has drawn back more than there is")?;
         // Particles that go when elements are joined.
         let gone = |k: i64| (1..=-more[0]).contains(&k) || (now + more[1]..now).contains(&k);
         if model.welds.iter().flat_map(|(_, w)| &w.members).any(|m| m.rod == slot && gone(i64::from(m.particle))) {
@@ -187,20 +205,28 @@ pub(crate) fn check(model: &Model, from: &State, to: &State) -> Result<(), &'sta
     if ends == to.rest_length.len() { Ok(()) } else { Err("it is of a world with other threads") }
 }
 
-/// Whether a state that [`check`] has passed has the rest lengths of the model, which now fits the state `from`. Of a thread with a reel the length of the elements
-/// at the reel is compared: what was fed in and drawn back may have come of others.
+/// Whether a state that [`check`] has passed has the rest lengths of the model, which now fits the state `from`. Of a
+/// thread with a reel the length of the elements at the reel is compared: what was fed in and drawn back may have come
+/// of others.
 pub(crate) fn check_lengths(model: &Model, from: &State, to: &State) -> Result<(), String> {
     let mut rods: Vec<_> = model.rods.iter().collect();
     rods.sort_unstable_by_key(|(_, r)| r.first);
     let mut first = 0;
     for (slot, rod) in rods {
-        let nominal = |state: &State, at_end: bool| state.reels.iter().map(|(_, r)| r).find(|r| (r.rod, r.at_end) == (slot, at_end)).map(|r| r.nominal);
-        let more: i64 = [false, true].map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end))).iter().sum();
+        let nominal = |state: &State, at_end: bool| {
+            state.reels.iter().map(|(_, r)| r).find(|r| (r.rod, r.at_end) == (slot, at_end)).map(|r| r.nominal)
+        };
+        let more: i64 = [false, true]
+            .map(|at_end| i64::from(added(to, slot, at_end)) - i64::from(added(from, slot, at_end)))
+            .iter()
+            .sum();
         let n = (i64::from(rod.n_elements) + more) as usize;
         let (here, there) = (&model.rest_length[rod.elements()], &to.rest_length[first..first + n]);
         first += n + 1;
         let differs = |place: String, here: f64, there: f64| {
-            Err(format!("it is of a world with other threads: of thread {slot}, {place} is {there} m long at rest there, {here} m here"))
+            Err(format!(
+                "it is of a world with other threads: of thread {slot}, {place} is {there} m long at rest there, {here} m here"
+            ))
         };
         let reels = [false, true].map(|at_end| (nominal(from, at_end), nominal(to, at_end)));
         if reels.iter().all(|(a, b)| a.is_none() && b.is_none()) {
@@ -214,7 +240,11 @@ pub(crate) fn check_lengths(model: &Model, from: &State, to: &State) -> Result<(
             if now.is_some() || then.is_some() {
                 let (here, there) = (now.unwrap_or(at(here)), then.unwrap_or(at(there)));
                 if !crate::snapshot::same(here, there) {
-                    return differs(format!("an element at the {}", if at_end == 1 { "end" } else { "start" }), here, there);
+                    return differs(
+                        format!("an element at the {}", if at_end == 1 { "end" } else { "start" }),
+                        here,
+                        there,
+                    );
                 }
             }
         }
@@ -228,7 +258,13 @@ pub(crate) fn refit(model: &mut Model, from: &State, to: &State) {
     for slot in slots {
         for at_end in [false, true] {
             let (now, want) = (added(from, slot, at_end), added(to, slot, at_end));
-            let end = |model: &Model| model.rods.at(slot).map(|r| if at_end { r.elements().end - 1 } else { r.first as usize }).expect("listed");
+            let end = |model: &Model| {
+                model
+                    .rods
+                    .at(slot)
+                    .map(|r| if at_end { r.elements().end - 1 } else { r.first as usize })
+                    .expect("listed")
+            };
             for _ in now..want {
                 let e = end(model);
                 split_model(model, slot, e);
@@ -267,7 +303,19 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! again {
         ($($array:ident),*) => {$( let v = $array[e].clone(); $array.insert(e + 1, v); )*};
     }
-    again!(mass, rod_of, rest_length, factors, section, inertia, joint_length, stretch_stiffness, inextensible, bend_stiffness, bend_damping);
+    again!(
+        mass,
+        rod_of,
+        rest_length,
+        factors,
+        section,
+        inertia,
+        joint_length,
+        stretch_stiffness,
+        inextensible,
+        bend_stiffness,
+        bend_damping
+    );
     rest_half.insert(e + 1, glam::DQuat::IDENTITY);
     shift_model(rods, rod, e, 1);
     for (_, weld) in model.welds.iter_mut() {
@@ -300,7 +348,20 @@ fn merge_model(model: &mut Model, rod: u32, e: usize) {
     macro_rules! without {
         ($($array:ident),*) => {$( $array.remove(e + 1); )*};
     }
-    without!(mass, rod_of, rest_length, factors, section, inertia, joint_length, rest_half, stretch_stiffness, inextensible, bend_stiffness, bend_damping);
+    without!(
+        mass,
+        rod_of,
+        rest_length,
+        factors,
+        section,
+        inertia,
+        joint_length,
+        rest_half,
+        stretch_stiffness,
+        inextensible,
+        bend_stiffness,
+        bend_damping
+    );
     shift_model(rods, rod, e, -1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {
@@ -325,7 +386,8 @@ fn shift_model(rods: &mut Slots<RodModel>, rod: u32, e: usize, by: i32) {
 fn split_state(model: &Model, state: &mut State, reel: u32, e: usize, first: f64) {
     let l = model.rest_length[e];
     let part = first / l;
-    let (x, v) = (state.position[e].lerp(state.position[e + 1], part), state.velocity[e].lerp(state.velocity[e + 1], part));
+    let (x, v) =
+        (state.position[e].lerp(state.position[e + 1], part), state.velocity[e].lerp(state.velocity[e + 1], part));
     state.position.insert(e + 1, x);
     state.velocity.insert(e + 1, v);
     let State { orientation, angular_velocity, tension, plastic, hardened, rest_length, .. } = &mut *state;
@@ -350,7 +412,8 @@ fn split_state(model: &Model, state: &mut State, reel: u32, e: usize, first: f64
 fn merge_state(model: &Model, state: &mut State, reel: u32, e: usize, at_end: bool) {
     let (a, b) = (model.rest_length[e], model.rest_length[e + 1]);
     let keep = if at_end { e } else { e + 1 };
-    let State { position, velocity, orientation, angular_velocity, tension, plastic, hardened, rest_length, .. } = &mut *state;
+    let State { position, velocity, orientation, angular_velocity, tension, plastic, hardened, rest_length, .. } =
+        &mut *state;
     position.remove(e + 1);
     velocity.remove(e + 1);
     (orientation[e], angular_velocity[e], tension[e]) = (orientation[keep], angular_velocity[keep], tension[keep]);
@@ -371,7 +434,14 @@ fn merge_state(model: &Model, state: &mut State, reel: u32, e: usize, at_end: bo
 }
 
 /// Names of particles and elements after element `e` change by one; `place` says where places on elements are now.
-fn renumber_state(model: &Model, state: &mut State, reel: u32, e: usize, by: i32, place: &dyn Fn(u32, f64) -> (u32, f64)) {
+fn renumber_state(
+    model: &Model,
+    state: &mut State,
+    reel: u32,
+    e: usize,
+    by: i32,
+    place: &dyn Fn(u32, f64) -> (u32, f64),
+) {
     let rod = state.reels.at(reel).expect("the reel that feeds").rod;
     let local = e as u32 - model.rods.at(rod).expect("living").first;
     let moved = |k: u32| if k > local { k.saturating_add_signed(by) } else { k };
@@ -410,15 +480,26 @@ mod tests {
     #[test]
     fn an_arc_keeps_its_material_through_substeps_that_are_put_back() {
         let mut world = World::new(Settings { newton_max: 1, halvings: 2, ..Settings::default() }).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0))).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0)))
+            .unwrap();
         world.insert_grip(&crate::GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
         let reel = world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.01), supply: None }).unwrap();
-        world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::Arc(0.015), mass: 1e-5, inertia: DVec3::ZERO } }).unwrap();
+        world
+            .insert_load(&LoadSpec {
+                rod,
+                kind: LoadKind::Mass { place: Place::Arc(0.015), mass: 1e-5, inertia: DVec3::ZERO },
+            })
+            .unwrap();
         let rejected: u32 = (0..30).map(|_| world.step(1.0 / 60.0).rejected).sum();
         assert!(rejected > 10, "{rejected}");
         let fed = world.reel_fed(reel).unwrap();
         let (_, mut state) = world.into_parts();
-        let arcs: Vec<f64> = state.loads.iter_mut().filter_map(|(_, l)| if let Some(Place::Arc(s)) = l.kind.place_mut() { Some(*s) } else { None }).collect();
+        let arcs: Vec<f64> = state
+            .loads
+            .iter_mut()
+            .filter_map(|(_, l)| if let Some(Place::Arc(s)) = l.kind.place_mut() { Some(*s) } else { None })
+            .collect();
         assert!((arcs[0] - 0.015 - fed).abs() < 1e-12 && fed > 1e-3, "{arcs:?} {fed}");
     }
 
@@ -438,7 +519,9 @@ mod tests {
     #[test]
     fn contacts_stay_in_order_when_an_element_is_cut_and_joined() {
         let mut world = World::default();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0))).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 10, 1.5e-4, Material::elastic(2e9, 1150.0)))
+            .unwrap();
         world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.0), supply: None }).unwrap();
         let (mut model, mut state) = world.into_parts();
         let contact = |element: u32, s: f64| ShapeContact {
@@ -452,7 +535,8 @@ mod tests {
             sliding: false,
         };
         // Of a shape 1 they come after all of a shape 0.
-        state.shape_contacts = vec![contact(0, 0.2), contact(0, 0.9), contact(1, 0.1), ShapeContact { shape: 1, ..contact(0, 0.3) }];
+        state.shape_contacts =
+            vec![contact(0, 0.2), contact(0, 0.9), contact(1, 0.1), ShapeContact { shape: 1, ..contact(0, 0.3) }];
         let pair = |a: u32, s: f64, b: u32| ThreadContact {
             a,
             b,

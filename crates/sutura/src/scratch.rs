@@ -14,16 +14,16 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 pub(crate) enum Freedom {
     Free,
     Held,
-    /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the substep, \[N/m\]).
-    /// Its move is counted from `from`.
+    /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the
+    /// substep, \[N/m\]). Its move is counted from `from`.
     Line {
         direction: DVec3,
         force: f64,
         damper: f64,
         from: DVec3,
     },
-    /// Everywhere, with a force \[N\] and a damper that acts in every direction (force per move within the substep, \[N/m\]).
-    /// Its move is counted from `from`.
+    /// Everywhere, with a force \[N\] and a damper that acts in every direction (force per move within the substep,
+    /// \[N/m\]). Its move is counted from `from`.
     Led {
         force: DVec3,
         damper: f64,
@@ -36,10 +36,13 @@ impl Freedom {
     pub fn drive(&self, position: DVec3) -> Option<(DMat3, DVec3)> {
         match *self {
             Freedom::Free | Freedom::Held => None,
-            Freedom::Line { direction, force, damper, from } => {
-                Some((crate::math::outer(direction, direction) * damper, direction * (force - damper * direction.dot(position - from))))
+            Freedom::Line { direction, force, damper, from } => Some((
+                crate::math::outer(direction, direction) * damper,
+                direction * (force - damper * direction.dot(position - from)),
+            )),
+            Freedom::Led { force, damper, from } => {
+                Some((DMat3::IDENTITY * damper, force - (position - from) * damper))
             }
-            Freedom::Led { force, damper, from } => Some((DMat3::IDENTITY * damper, force - (position - from) * damper)),
         }
     }
     /// Projector on the directions that stay free.
@@ -108,8 +111,8 @@ pub(crate) struct Scratch {
     pub tension: Vec<f64>,
     /// What the last step, in full, changes it by in inextensible threads.
     pub tension_change: Vec<f64>,
-    /// Axial force at its rest length \[N\] of each element that stretches as its material does although its thread is inextensible, for the rest of
-    /// a step.
+    /// Axial force at its rest length \[N\] of each element that stretches as its material does although its thread is
+    /// inextensible, for the rest of a step.
     pub stretches: Vec<Option<f64>>,
     /// Predicted shear force along the first two directors, likewise.
     pub shear: Vec<DVec2>,
@@ -119,15 +122,16 @@ pub(crate) struct Scratch {
     /// Blocks of each living rod, and the zone of its thread contacts.
     pub rods: Vec<(Range<usize>, Range<usize>)>,
 
-    /// Work of the substep so far, in rough counts of multiplications: counted, not timed. And that of the substeps before in this step, of the last one accepted,
-    /// and what the step may take.
+    /// Work of the substep so far, in rough counts of multiplications: counted, not timed. And that of the substeps
+    /// before in this step, of the last one accepted, and what the step may take.
     pub work: f64,
     pub spent: f64,
     pub last_work: f64,
     pub allowed: f64,
     /// Whether the step ends here, since that is spent.
     pub cut: bool,
-    /// Rods that the last attempt was refused for, and rods that are held where they were, from when, for the rest of the step.
+    /// Rods that the last attempt was refused for, and rods that are held where they were, from when, for the rest of
+    /// the step.
     pub refused: Option<[u32; 2]>,
     pub held: Vec<(u32, f64)>,
     pub candidates: Candidates,
@@ -142,7 +146,8 @@ impl Scratch {
     pub fn exhausted(&self) -> bool {
         self.work > crate::params::SUBSTEP_WORK
     }
-    /// Whether the step has taken all that it may. Where rods are held for its rest it is done to the end: which ones is not known in the next.
+    /// Whether the step has taken all that it may. Where rods are held for its rest it is done to the end: which ones
+    /// is not known in the next.
     pub fn late(&self) -> bool {
         self.held.is_empty() && self.spent + self.work > self.allowed
     }

@@ -1,11 +1,13 @@
 //! What threads and shapes look like: triangle meshes, and the skin that follows a moving thread (theory, section 18).
 //!
-//! A thread is a tube with one bone an element. Its bind pose is the thread straight along z from the origin at its rest lengths, bones at the
-//! middles of the elements, d1 along x: a bone's pose is the middle of its element and its material frame, so that a texture shows twist. Each
-//! vertex follows up to four bones by linear blending, what every game engine does on the graphics processor; [`Skin::pose`] does the same here.
+//! A thread is a tube with one bone an element. Its bind pose is the thread straight along z from the origin at its
+//! rest lengths, bones at the middles of the elements, d1 along x: a bone's pose is the middle of its element and its
+//! material frame, so that a texture shows twist. Each vertex follows up to four bones by linear blending, what every
+//! game engine does on the graphics processor; [`Skin::pose`] does the same here.
 //!
-//! Weights are those of a quadratic B-spline over three bones ([`Blend::Smooth`]). Where neighboring elements turn by an angle a, blending takes a part
-//! 1 - cos(a / 2) of the width in the plane of the bend and nothing of that across; a bone's scale gives both half of it back, so that the area stays.
+//! Weights are those of a quadratic B-spline over three bones ([`Blend::Smooth`]). Where neighboring elements turn by
+//! an angle a, blending takes a part 1 - cos(a / 2) of the width in the plane of the bend and nothing of that across; a
+//! bone's scale gives both half of it back, so that the area stays.
 //!
 //! ```
 //! use sutura::glam::DVec3;
@@ -58,18 +60,23 @@ impl TriangleMesh {
     pub fn placed(&self, pose: &Pose) -> Self {
         let turn = |n: &[f32; 3]| (pose.orientation * Vec3::from(*n).as_dvec3()).as_vec3().to_array();
         let place = |x: &[f32; 3]| pose.transform_point(Vec3::from(*x).as_dvec3()).as_vec3().to_array();
-        TriangleMesh { positions: self.positions.iter().map(place).collect(), normals: self.normals.iter().map(turn).collect(), ..self.clone() }
+        TriangleMesh {
+            positions: self.positions.iter().map(place).collect(),
+            normals: self.normals.iter().map(turn).collect(),
+            ..self.clone()
+        }
     }
 }
 
 /// How the vertices of a skin follow bones.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Blend {
-    /// Quadratic B-spline over the three nearest bones: the tube has no edges, and is thinned by no more than two bones would.
+    /// Quadratic B-spline over the three nearest bones: the tube has no edges, and is thinned by no more than two bones
+    /// would.
     #[default]
     Smooth,
-    /// The four nearest bones by the inverse of the vertex's distance from them, as in the 2018 paper. It thins bends three times as
-    /// much or more.
+    /// The four nearest bones by the inverse of the vertex's distance from them, as in the 2018 paper. It thins bends
+    /// three times as much or more.
     InverseDistance,
 }
 
@@ -94,15 +101,16 @@ pub struct SkinSpec {
     pub blend: Blend,
 }
 
-/// Where a bone is: the middle of an element and its material frame. As a transform of a game engine: this translation and rotation, the scale
-/// `(scale, scale, stretch)`.
+/// Where a bone is: the middle of an element and its material frame. As a transform of a game engine: this translation
+/// and rotation, the scale `(scale, scale, stretch)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bone {
     /// Middle of the element in the world \[m\].
     pub position: Vec3,
     /// `world_from_material`.
     pub orientation: Quat,
-    /// Factor on the cross-section, along d1 and d2: 1 where the thread is straight, more where blending would make it thinner.
+    /// Factor on the cross-section, along d1 and d2: 1 where the thread is straight, more where blending would make it
+    /// thinner.
     pub scale: f32,
     /// Length of the element over that in the bind pose.
     pub stretch: f32,
@@ -167,7 +175,8 @@ struct Corner {
 enum Surface {
     /// The tube, with the rate at which its size grows \[1/m\].
     Side(f64),
-    /// A round end, half an ellipsoid, at this latitude \[rad\]: positive at the end of the thread, negative at its start.
+    /// A round end, half an ellipsoid, at this latitude \[rad\]: positive at the end of the thread, negative at its
+    /// start.
     Round(f64),
     /// A flat end that looks along z this way.
     Flat(f64),
@@ -186,10 +195,20 @@ struct Place {
 impl SkinSpec {
     /// A round tube of one radius with 12 sides and 4 rings an element.
     pub fn new(lengths: Vec<f64>, radius: f64) -> Self {
-        SkinSpec { lengths, radius, section: Section::Round, size: Profile::default(), seam: None, sides: 12, rings: 4, blend: Blend::Smooth }
+        SkinSpec {
+            lengths,
+            radius,
+            section: Section::Round,
+            size: Profile::default(),
+            seam: None,
+            sides: 12,
+            rings: 4,
+            blend: Blend::Smooth,
+        }
     }
 
-    /// The tube of a thread as it is now: its rest lengths, section, size and seam, with 12 sides and 4 rings an element.
+    /// The tube of a thread as it is now: its rest lengths, section, size and seam, with 12 sides and 4 rings an
+    /// element.
     pub fn of(rod: &RodView<'_>) -> Self {
         SkinSpec {
             section: rod.cross_section(),
@@ -206,7 +225,13 @@ impl SkinSpec {
         }
         let n = self.lengths.len();
         let least = if self.seam.is_some() { 3 } else { 1 };
-        check(what, "lengths", n as f64, n >= least && n <= 65_000, "1 to 65 000 elements, 3 or more of a closed thread")?;
+        check(
+            what,
+            "lengths",
+            n as f64,
+            n >= least && n <= 65_000,
+            "1 to 65 000 elements, 3 or more of a closed thread",
+        )?;
         check(what, "radius", self.radius, self.radius > 0.0, "a finite radius > 0 [m]")?;
         check(what, "sides", f64::from(self.sides), (3..=256).contains(&self.sides), "3 to 256")?;
         check(what, "rings", f64::from(self.rings), (1..=64).contains(&self.rings), "1 to 64")?;
@@ -239,7 +264,8 @@ impl Skin {
         let repeats: Vec<(usize, DQuat)> = ahead.chain(behind).collect();
 
         let length: f64 = spec.lengths.iter().sum();
-        let middles: Vec<f64> = spec.lengths.iter().scan(0.0, |arc, l| Some(std::mem::replace(arc, *arc + l) + 0.5 * l)).collect();
+        let middles: Vec<f64> =
+            spec.lengths.iter().scan(0.0, |arc, l| Some(std::mem::replace(arc, *arc + l) + 0.5 * l)).collect();
         let mut bind = middles.clone();
         bind.extend(middles[..beyond].iter().map(|z| z + length));
         bind.extend(middles[n - beyond..].iter().map(|z| z - length));
@@ -304,8 +330,9 @@ impl Skin {
         Ok(skin)
     }
 
-    /// The mesh in the bind pose, with texture coordinates: u around, from 0 at d1 to 1; v along, in circumferences from the start of the thread, so that
-    /// a square of the texture is a square on the thread. Around a closed thread v grows by a whole number.
+    /// The mesh in the bind pose, with texture coordinates: u around, from 0 at d1 to 1; v along, in circumferences
+    /// from the start of the thread, so that a square of the texture is a square on the thread. Around a closed thread
+    /// v grows by a whole number.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }
@@ -313,7 +340,8 @@ impl Skin {
     pub fn n_vertices(&self) -> usize {
         self.mesh.positions.len()
     }
-    /// Number of elements of the thread that it fits. A thread on a reel gains and loses elements: then it wants another skin.
+    /// Number of elements of the thread that it fits. A thread on a reel gains and loses elements: then it wants
+    /// another skin.
     pub fn n_elements(&self) -> usize {
         self.n_elements
     }
@@ -329,7 +357,8 @@ impl Skin {
     pub fn weights(&self) -> &[[f32; 4]] {
         &self.weights
     }
-    /// Place of each bone on the z axis in the bind pose, where its frame is the world's \[m\]: the inverse bind matrix is a translation by minus that.
+    /// Place of each bone on the z axis in the bind pose, where its frame is the world's \[m\]: the inverse bind matrix
+    /// is a translation by minus that.
     pub fn bind(&self) -> &[f64] {
         &self.bind
     }
@@ -337,7 +366,8 @@ impl Skin {
     /// The bones of a thread.
     ///
     /// # Panics
-    /// When the thread has another number of elements than [`Skin::n_elements`], or `bones` is not as long as [`Skin::n_bones`].
+    /// When the thread has another number of elements than [`Skin::n_elements`], or `bones` is not as long as
+    /// [`Skin::n_bones`].
     pub fn bones(&self, rod: &RodView<'_>, bones: &mut [Bone]) {
         self.bones_at(rod.positions(), rod.orientations(), bones);
     }
@@ -348,7 +378,11 @@ impl Skin {
     /// When the lengths do not fit.
     pub fn bones_at(&self, positions: &[DVec3], orientations: &[DQuat], bones: &mut [Bone]) {
         let n = self.n_elements;
-        assert!(positions.len() == n + 1 && orientations.len() == n, "a thread of {} elements, the skin is of {n}", orientations.len());
+        assert!(
+            positions.len() == n + 1 && orientations.len() == n,
+            "a thread of {} elements, the skin is of {n}",
+            orientations.len()
+        );
         assert_eq!(bones.len(), self.n_bones(), "bones of the skin");
         let mut kept = self.repeats.first().map_or(1.0, |_| self.seam_area(orientations));
         for e in 0..n {
@@ -377,14 +411,18 @@ impl Skin {
         area_kept(last.conjugate() * *first * self.repeats[0].1)
     }
 
-    /// Positions \[m\] and unit normals of the vertices where the bones are, by linear blending: M = sum of w R S, the transposed inverse of M for normals.
-    /// Nothing is allocated.
+    /// Positions \[m\] and unit normals of the vertices where the bones are, by linear blending: M = sum of w R S, the
+    /// transposed inverse of M for normals. Nothing is allocated.
     ///
     /// # Panics
     /// When `bones` is not as long as [`Skin::n_bones`], or a buffer not as long as [`Skin::n_vertices`].
     pub fn pose(&self, bones: &[Bone], positions: &mut [[f32; 3]], normals: &mut [[f32; 3]]) {
         assert_eq!(bones.len(), self.n_bones(), "bones of the skin");
-        assert!(positions.len() == self.n_vertices() && normals.len() == self.n_vertices(), "buffers of {} vertices", self.n_vertices());
+        assert!(
+            positions.len() == self.n_vertices() && normals.len() == self.n_vertices(),
+            "buffers of {} vertices",
+            self.n_vertices()
+        );
         let bound = self.mesh.positions.chunks_exact(self.width).zip(self.mesh.normals.chunks_exact(self.width));
         let out = positions.chunks_exact_mut(self.width).zip(normals.chunks_exact_mut(self.width));
         for ((row, (x, n)), (to_x, to_n)) in self.rows.iter().zip(bound).zip(out) {
@@ -411,8 +449,9 @@ impl Skin {
         }
     }
 
-    /// The row at part `t` of element `e` follows elements e - 1, e, e + 1 by (1 - t)^2 / 2, 3/4 - (t - 1/2)^2, t^2 / 2. All bones of weight agree on
-    /// the joint, so that the tube has no edge there whatever the lengths. At an end the last bone takes the part of the one that is missing.
+    /// The row at part `t` of element `e` follows elements e - 1, e, e + 1 by (1 - t)^2 / 2, 3/4 - (t - 1/2)^2, t^2 /
+    /// 2. All bones of weight agree on the joint, so that the tube has no edge there whatever the lengths. At an end
+    ///    the last bone takes the part of the one that is missing.
     fn smooth(&self, place: &Place, order: &[usize], beyond: usize) -> Row {
         let t = place.part;
         let wanted = [0.5 * (1.0 - t) * (1.0 - t), 0.75 - (t - 0.5) * (t - 0.5), 0.5 * t * t];
@@ -451,8 +490,9 @@ impl Skin {
 /// The most that a bone's scale makes up for: it widens the thread across the bend by as much.
 const WIDEST: f64 = 1.25;
 
-/// Part of the area of a cross-section that is left midway between two bones with this turn q from one to the other: the mean (1 + R) / 2 of both
-/// shrinks by w = cos(a / 2) across the axis of the turn and not along it, so that the area across z shrinks by w sqrt(1 - q_z^2).
+/// Part of the area of a cross-section that is left midway between two bones with this turn q from one to the other:
+/// the mean (1 + R) / 2 of both shrinks by w = cos(a / 2) across the axis of the turn and not along it, so that the
+/// area across z shrinks by w sqrt(1 - q_z^2).
 fn area_kept(q: DQuat) -> f64 {
     q.w.abs() * (1.0 - q.z * q.z).max(0.0).sqrt()
 }
@@ -464,7 +504,8 @@ impl Outline {
             Section::Round => (Self::round(radius, radius, sides, &mut corners), false),
             Section::Ellipse([a, b]) => (Self::round(a, b, sides, &mut corners), false),
             Section::Rectangle([a, b]) => {
-                let at = [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(x, y)| DVec2::new(0.5 * a * x, 0.5 * b * y));
+                let at = [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]
+                    .map(|(x, y)| DVec2::new(0.5 * a * x, 0.5 * b * y));
                 for (k, gradient) in [DVec2::X, DVec2::Y, DVec2::NEG_X, DVec2::NEG_Y].into_iter().enumerate() {
                     corners.push(Corner { at: at[k], gradient, u: 0.0, face: true });
                     corners.push(Corner { at: at[(k + 1) % 4], gradient, u: 0.0, face: false });
@@ -487,7 +528,12 @@ impl Outline {
     fn round(a: f64, b: f64, sides: u32, corners: &mut Vec<Corner>) -> f64 {
         for k in 0..=sides {
             let (sin, cos) = libm::sincos(TAU * f64::from(k % sides) / f64::from(sides));
-            corners.push(Corner { at: DVec2::new(a * cos, b * sin), gradient: DVec2::new(cos / a, sin / b), u: 0.0, face: k < sides });
+            corners.push(Corner {
+                at: DVec2::new(a * cos, b * sin),
+                gradient: DVec2::new(cos / a, sin / b),
+                u: 0.0,
+                face: k < sides,
+            });
         }
         a.min(b)
     }
@@ -520,7 +566,8 @@ fn places(spec: &SkinSpec, outline: &Outline) -> Vec<Place> {
         body.iter_mut().for_each(|p| p.v *= whole);
         return body;
     }
-    // Ends: rows of a quarter of the sides, or the middle and the rim of a flat one. They follow the last element alone.
+    // Ends: rows of a quarter of the sides, or the middle and the rim of a flat one. They follow the last element
+    // alone.
     let latitudes = (spec.sides as usize / 4).max(2);
     let end = |at: &Place, way: f64| -> Vec<Place> {
         let place = |z: f64, size: f64, surface: Surface, arc: f64| {
@@ -547,18 +594,22 @@ fn places(spec: &SkinSpec, outline: &Outline) -> Vec<Place> {
     all
 }
 
-/// The mesh of a shape in its own frame, with edges where faces meet at more than 40 degrees and smooth elsewhere. Round ones have `sides` sides (3 or
-/// more), a plane is a square of `half_side` \[m\] about its origin. The meshes of round and square ones are parry3d's.
+/// The mesh of a shape in its own frame, with edges where faces meet at more than 40 degrees and smooth elsewhere.
+/// Round ones have `sides` sides (3 or more), a plane is a square of `half_side` \[m\] about its origin. The meshes of
+/// round and square ones are parry3d's.
 pub fn shape_mesh(geometry: &Geometry, sides: u32, half_side: f64) -> TriangleMesh {
     let sides = sides.max(3);
     let (points, triangles) = match geometry {
         Geometry::Plane => {
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x * half_side, y * half_side, 0.0));
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec3::new(x * half_side, y * half_side, 0.0));
             return creased(&corners, &[[0, 1, 2], [0, 2, 3]]);
         }
         Geometry::Mesh { vertices, triangles } => return creased(vertices, triangles),
         Geometry::Sphere { radius } => Ball::new(*radius).to_trimesh(sides, (sides / 2).max(2)),
-        Geometry::Capsule { radius, half_length } => Capsule::new_y(*half_length, *radius).to_trimesh(sides, (sides / 2).max(2)),
+        Geometry::Capsule { radius, half_length } => {
+            Capsule::new_y(*half_length, *radius).to_trimesh(sides, (sides / 2).max(2))
+        }
         Geometry::Cylinder { radius, half_length } => Cylinder::new(*half_length, *radius).to_trimesh(sides),
         Geometry::Box { half_sides } => Cuboid::new(DVec3::new(half_sides.x, half_sides.z, half_sides.y)).to_trimesh(),
     };
@@ -567,8 +618,8 @@ pub fn shape_mesh(geometry: &Geometry, sides: u32, half_side: f64) -> TriangleMe
     creased(&turned, &triangles)
 }
 
-/// A mesh with normals: at each corner of a triangle the mean, by angle, of the triangles around the vertex that are turned from it by less than 40 degrees.
-/// Vertices with several normals are repeated.
+/// A mesh with normals: at each corner of a triangle the mean, by angle, of the triangles around the vertex that are
+/// turned from it by less than 40 degrees. Vertices with several normals are repeated.
 fn creased(vertices: &[DVec3], triangles: &[[u32; 3]]) -> TriangleMesh {
     const CREASE: f64 = 0.766_044_443_118_978;
     let corner = |t: usize, k: usize| vertices[triangles[t][k % 3] as usize];

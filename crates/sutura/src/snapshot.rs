@@ -17,8 +17,8 @@ const MAGIC: &[u8; 8] = b"sutura\x05\0";
 /// Those of version 4, which says only what threads were made of.
 const MATERIALS: &[u8; 8] = b"sutura\x04\0";
 
-/// Those of version 3, which does not say what threads were made of. The hash of a state begins with them, whatever the version, so that states of builds
-/// that differ in nothing else can be compared.
+/// Those of version 3, which does not say what threads were made of. The hash of a state begins with them, whatever the
+/// version, so that states of builds that differ in nothing else can be compared.
 const BARE: &[u8; 8] = b"sutura\x03\0";
 
 /// Something that is written and read back without loss.
@@ -194,7 +194,23 @@ structure!(LoadState { rod, kind });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
 structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
 structure!(ShapeContact { shape, element, s, normal, normal_force, friction, drift, sliding });
-structure!(GripState { rod, index, hold, drive, ramp, taken_at, taken_pose, taken_velocity, taken_spin, pose, target, rest_half, half_span, force, torque });
+structure!(GripState {
+    rod,
+    index,
+    hold,
+    drive,
+    ramp,
+    taken_at,
+    taken_pose,
+    taken_velocity,
+    taken_spin,
+    pose,
+    target,
+    rest_half,
+    half_span,
+    force,
+    torque
+});
 structure!(State {
     time,
     last_h,
@@ -225,7 +241,8 @@ structure!(BuiltRod { slot, n_elements, radius, closed, section, along, rest });
 structure!(BuiltShape { slot, geometry });
 structure!(BuiltWeld { slot, places });
 
-/// What a model was built from, beside the lengths that are in the state: numbers where a message can name them, hashes of the rest.
+/// What a model was built from, beside the lengths that are in the state: numbers where a message can name them, hashes
+/// of the rest.
 pub(crate) struct Build {
     /// Of materials, and whether threads stretch. These may have changed.
     pub materials: u64,
@@ -268,14 +285,23 @@ impl Build {
         let shape = |(slot, s): (u32, &ShapeModel)| BuiltShape { slot, geometry: s.hash };
         let place = |m: &Member| (m.rod, m.particle as i32 - crate::reel::added(state, m.rod, false));
         let weld = |(slot, w): (u32, &WeldModel)| BuiltWeld { slot, places: w.members.iter().map(place).collect() };
-        Build { materials: made_of(model), rods, shapes: model.shapes.iter().map(shape).collect(), welds: model.welds.iter().map(weld).collect() }
+        Build {
+            materials: made_of(model),
+            rods,
+            shapes: model.shapes.iter().map(shape).collect(),
+            welds: model.welds.iter().map(weld).collect(),
+        }
     }
 
     /// What another one has that this one has not, in words: `self` is here, `there` in the snapshot.
     pub(crate) fn unlike(&self, there: &Build) -> Option<String> {
         let slots = |b: &Build| b.rods.iter().map(|r| r.slot).collect::<Vec<_>>();
         if slots(self) != slots(there) {
-            return Some(format!("it is of a world with other threads: those in the slots {:?}, here {:?}", slots(there), slots(self)));
+            return Some(format!(
+                "it is of a world with other threads: those in the slots {:?}, here {:?}",
+                slots(there),
+                slots(self)
+            ));
         }
         let words = |closed: bool| if closed { "closed" } else { "open" };
         for (here, there) in self.rods.iter().zip(&there.rods) {
@@ -298,10 +324,17 @@ impl Build {
         }
         let slots = |b: &Build| b.shapes.iter().map(|s| s.slot).collect::<Vec<_>>();
         if slots(self) != slots(there) {
-            return Some(format!("it is of a world with other shapes: those in the slots {:?}, here {:?}", slots(there), slots(self)));
+            return Some(format!(
+                "it is of a world with other shapes: those in the slots {:?}, here {:?}",
+                slots(there),
+                slots(self)
+            ));
         }
         if let Some((here, _)) = self.shapes.iter().zip(&there.shapes).find(|(a, b)| a.geometry != b.geometry) {
-            return Some(format!("it is of a world with other shapes: the geometry of shape {} is another there", here.slot));
+            return Some(format!(
+                "it is of a world with other shapes: the geometry of shape {} is another there",
+                here.slot
+            ));
         }
         let welds = |b: &Build| b.welds.iter().map(|w| (w.slot, w.places.clone())).collect::<Vec<_>>();
         (welds(self) != welds(there)).then(|| "it is of a world with other welds".into())
@@ -311,8 +344,10 @@ impl Build {
 impl BuiltRod {
     fn of(model: &Model, state: &State, slot: u32, rod: &RodModel) -> Self {
         let added = [false, true].map(|at_end| crate::reel::added(state, slot, at_end));
-        // What reels add is like its neighbors and straight at rest: the same factors once, and the places that are not straight.
-        let mut along = model.factors[rod.elements()].iter().map(|f| [f.size, f.modulus, f.density]).collect::<Vec<_>>();
+        // What reels add is like its neighbors and straight at rest: the same factors once, and the places that are not
+        // straight.
+        let mut along =
+            model.factors[rod.elements()].iter().map(|f| [f.size, f.modulus, f.density]).collect::<Vec<_>>();
         along.dedup();
         let mut rest = Vec::new();
         for (k, q) in model.rest_half[rod.elements()].iter().enumerate().filter(|(_, q)| **q != DQuat::IDENTITY) {
@@ -322,7 +357,8 @@ impl BuiltRod {
         let seam = model.weld_of[rod.first as usize].filter(|w| model.weld_of[rod.particles().end - 1] == Some(*w));
         // The rest shape at the seam, as it was closed.
         let members = seam.and_then(|w| model.welds.at(w)).map_or(&[][..], |w| &w.members);
-        for side in members.iter().flat_map(|m| [m.before, m.after]).flatten().filter(|s| s.section == DQuat::IDENTITY) {
+        for side in members.iter().flat_map(|m| [m.before, m.after]).flatten().filter(|s| s.section == DQuat::IDENTITY)
+        {
             side.rest_half.put(&mut rest);
         }
         BuiltRod {
@@ -385,7 +421,8 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Snapshot, Error> {
     Ok(Snapshot { materials, build, state })
 }
 
-/// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a state are of these.
+/// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a
+/// state are of these.
 pub(crate) fn made_of(model: &Model) -> u64 {
     let mut bytes = Vec::new();
     for (slot, rod) in model.rods.iter() {

@@ -29,7 +29,13 @@ pub(crate) struct Interval<'a> {
 }
 
 /// Advances the whole world by the interval, in equal substeps no longer than the setting.
-pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, report: &mut StepReport) {
+pub(crate) fn step(
+    model: &mut Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &mut Interval<'_>,
+    report: &mut StepReport,
+) {
     if let Solver::Paper(p) = model.settings.solver {
         pbd::step(model, state, scratch, interval, &p, report);
         return;
@@ -60,7 +66,8 @@ pub(crate) fn step(model: &mut Model, state: &mut State, scratch: &mut Scratch, 
     // Where nothing acceptable was found, what is driven stays with the rest.
     let reached = if whole { 1.0 } else { (state.time - interval.start) / interval.length };
     for (_, grip) in state.grips.iter_mut() {
-        let held = scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
+        let held =
+            scratch.held.iter().find(|(rod, _)| *rod == grip.rod).map(|(_, t)| (t - interval.start) / interval.length);
         grip.pose = grip.pose.interpolate(&grip.target, held.unwrap_or(reached));
     }
     report.simulated = reached * interval.length;
@@ -107,13 +114,19 @@ fn advance(
     report: &mut StepReport,
 ) -> bool {
     // Where substeps had to be short a while ago they start short.
-    if depth < model.settings.halvings && state.last_h > 0.0 && h > state.last_h * if state.calm < CALM { 1.5 } else { 3.0 } {
+    if depth < model.settings.halvings
+        && state.last_h > 0.0
+        && h > state.last_h * if state.calm < CALM { 1.5 } else { 3.0 }
+    {
         let half = 0.5 * h;
         return advance(model, state, scratch, interval, t, half, depth + 1, report)
             && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
     }
     // Rather less than what would be thrown away.
-    if report.substeps > 0 && scratch.held.is_empty() && scratch.spent + scratch.work + scratch.last_work > scratch.allowed {
+    if report.substeps > 0
+        && scratch.held.is_empty()
+        && scratch.spent + scratch.work + scratch.last_work > scratch.allowed
+    {
         scratch.cut = true;
         return false;
     }
@@ -127,7 +140,8 @@ fn advance(
     let mut method = if reels { Method::Euler } else { Method::of(model, state.onset, h) };
     let mut attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
     if attempt.too_coarse {
-        // What stops or jumps has no second derivative to go by, and would bounce; what turns too far in a substep would gain energy.
+        // What stops or jumps has no second derivative to go by, and would bounce; what turns too far in a substep
+        // would gain energy.
         restore(state, scratch, depth);
         method = Method::Euler;
         attempt = solve(model, state, scratch, interval, t, h, depth, method, report);
@@ -154,7 +168,10 @@ fn advance(
             report.shape_clearance = least(report.shape_clearance, clearance.shape);
             if !outcome.converged {
                 report.converged = false;
-                report.incidents.push(Incident { time: state.time, kind: IncidentKind::NotConverged { residual: outcome.residual } });
+                report.incidents.push(Incident {
+                    time: state.time,
+                    kind: IncidentKind::NotConverged { residual: outcome.residual },
+                });
             }
             (interval.observe)(View { model, state });
             true
@@ -182,12 +199,16 @@ fn advance(
                     && advance(model, state, scratch, interval, t + half, half, depth + 1, report);
             }
             if let Some(rods) = hold_refused(model, scratch, t) {
-                report.incidents.push(Incident { time: t, kind: IncidentKind::Held { reason, rods: rods.map(|r| model.rods.handle(r)) } });
+                report.incidents.push(Incident {
+                    time: t,
+                    kind: IncidentKind::Held { reason, rods: rods.map(|r| model.rods.handle(r)) },
+                });
                 report.converged = false;
                 (state.last_h, state.calm) = (0.0, 0);
                 return advance(model, state, scratch, interval, t, h, depth, report);
             }
-            let kind = if reason == Rejection::NotFinite { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
+            let kind =
+                if reason == Rejection::NotFinite { IncidentKind::NotFinite } else { IncidentKind::Stuck { reason } };
             report.incidents.push(Incident { time: t, kind });
             report.converged = false;
             state.last_h = 0.0;
@@ -200,8 +221,9 @@ fn advance(
     }
 }
 
-/// Holds the rods for which the last attempt was refused where they are, for the rest of the step; which ones. None when that is no help: they are held already,
-/// or nothing else is there to go on. (What threads share at a weld, and reels, would need more: then all stops.)
+/// Holds the rods for which the last attempt was refused where they are, for the rest of the step; which ones. None
+/// when that is no help: they are held already, or nothing else is there to go on. (What threads share at a weld, and
+/// reels, would need more: then all stops.)
 fn hold_refused(model: &Model, scratch: &mut Scratch, t: f64) -> Option<[u32; 2]> {
     let rods = scratch.refused.take()?;
     if model.welds.len() > 0 || !scratch.brakes.is_empty() {
@@ -218,12 +240,18 @@ fn hold_refused(model: &Model, scratch: &mut Scratch, t: f64) -> Option<[u32; 2]
 
 /// Tension over E A of the element of a rod that was last found to be pulled or pressed most.
 fn most_pulled(model: &Model, scratch: &Scratch, rod: &RodModel) -> f64 {
-    rod.elements().map(|e| scratch.tension[e] / model.section[e].ea).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
+    rod.elements()
+        .map(|e| scratch.tension[e] / model.section[e].ea)
+        .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a })
 }
 
 /// Inextensible threads that keep their length.
 fn keeping<'a>(model: &'a Model, scratch: &'a Scratch) -> impl Iterator<Item = &'a RodModel> {
-    model.rods.iter().map(|(_, rod)| rod).filter(|r| r.stretch == Stretch::Inextensible && scratch.stretches[r.first as usize].is_none())
+    model
+        .rods
+        .iter()
+        .map(|(_, rod)| rod)
+        .filter(|r| r.stretch == Stretch::Inextensible && scratch.stretches[r.first as usize].is_none())
 }
 
 /// Greatest tension over E A of inextensible threads that keep their length.
@@ -231,11 +259,13 @@ fn tautest(model: &Model, scratch: &Scratch) -> f64 {
     keeping(model, scratch).map(|rod| most_pulled(model, scratch, rod).abs()).fold(0.0, f64::max)
 }
 
-/// Inextensible threads that the last attempt found as `taut`, over E A, or more stretch as their material does from here to the end of the step.
-/// Whether there are any.
+/// Inextensible threads that the last attempt found as `taut`, over E A, or more stretch as their material does from
+/// here to the end of the step. Whether there are any.
 fn let_stretch(model: &Model, state: &State, scratch: &mut Scratch, taut: f64) -> bool {
-    let found: Vec<_> =
-        keeping(model, scratch).map(|rod| (rod.elements(), most_pulled(model, scratch, rod))).filter(|(_, pulled)| pulled.abs() >= taut).collect();
+    let found: Vec<_> = keeping(model, scratch)
+        .map(|rod| (rod.elements(), most_pulled(model, scratch, rod)))
+        .filter(|(_, pulled)| pulled.abs() >= taut)
+        .collect();
     for (elements, pulled) in &found {
         for e in elements.clone() {
             let ea = model.section[e].ea;
@@ -254,14 +284,19 @@ fn tell_lengths(model: &Model, state: &State, report: &mut StepReport) {
         let elongation = |e: usize| (state.position[e + 1] - state.position[e]).length() / model.rest_length[e] - 1.0;
         let most = rod.elements().map(elongation).fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         if most.abs() > 2.0 * newton::LENGTH_TOLERANCE {
-            report.incidents.push(Incident { time: state.time, kind: IncidentKind::LengthNotKept { rod: model.rods.handle(slot), elongation: most } });
+            report.incidents.push(Incident {
+                time: state.time,
+                kind: IncidentKind::LengthNotKept { rod: model.rods.handle(slot), elongation: most },
+            });
         }
     }
 }
 
-/// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of finite ones.
+/// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of
+/// finite ones.
 pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
-    let grips = state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
+    let grips =
+        state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
     let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
     let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
     // What threads do to a shape is read as a sum.
@@ -336,7 +371,11 @@ fn solve(
         }
         let mut so_far = match (attempt, verdict) {
             (Some(Attempt { outcome: before, verdict: Ok(c), .. }), Ok(d)) => Attempt {
-                outcome: newton::Outcome { converged: outcome.converged && before.converged, residual: outcome.residual.max(before.residual), ..outcome },
+                outcome: newton::Outcome {
+                    converged: outcome.converged && before.converged,
+                    residual: outcome.residual.max(before.residual),
+                    ..outcome
+                },
                 verdict: Ok(Clearance { thread: least(c.thread, d.thread), shape: least(c.shape, d.shape) }),
                 too_coarse: touches,
             },
@@ -417,7 +456,10 @@ pub(crate) fn grip_pose(grip: &GripState, interval: &Interval<'_>, t: f64) -> Po
         return command;
     }
     let along = t - grip.taken_at;
-    let own = Pose::new(grip.taken_pose.position + grip.taken_velocity * along, (exp(grip.taken_spin * along) * grip.taken_pose.orientation).normalize());
+    let own = Pose::new(
+        grip.taken_pose.position + grip.taken_velocity * along,
+        (exp(grip.taken_spin * along) * grip.taken_pose.orientation).normalize(),
+    );
     own.interpolate(&command, smoothstep(u.max(0.0)))
 }
 
@@ -428,7 +470,16 @@ fn smoothstep(u: f64) -> f64 {
 
 /// Moves the state to the iterate that Newton starts from, and places what is held. `began` is when the substep did.
 #[allow(clippy::too_many_arguments, reason = "those of `solve`")]
-fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, began: f64, stage: &Stage, h: f64, depth: u32) {
+fn predict(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &Interval<'_>,
+    began: f64,
+    stage: &Stage,
+    h: f64,
+    depth: u32,
+) {
     scratch.start.copy_from_slice(&state.position);
     scratch.start_frame.copy_from_slice(&state.orientation);
     scratch.start_shape_pose.clone_from(&state.shape_pose);
@@ -461,7 +512,10 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
             Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => {
                 let u = if grip.ramp > 0.0 { ((t - grip.taken_at) / grip.ramp).clamp(0.0, 1.0) } else { 1.0 };
                 let force = force * smoothstep(u);
-                (Some((direction, force, force / speed_limit / stage.span)), if grip.hold == Hold::Jaw { 0.5 } else { 1.0 })
+                (
+                    Some((direction, force, force / speed_limit / stage.span)),
+                    if grip.hold == Hold::Jaw { 0.5 } else { 1.0 },
+                )
             }
         };
         let mut place = |i: usize, position: DVec3| match line {
@@ -470,7 +524,11 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                 state.position[i] = position;
             }
             Some((direction, force, damper)) if force > 0.0 => {
-                let from = if stage.weights.is_some() { scratch.target[i] - scratch.carried[i] * stage.span } else { scratch.start[i] };
+                let from = if stage.weights.is_some() {
+                    scratch.target[i] - scratch.carried[i] * stage.span
+                } else {
+                    scratch.start[i]
+                };
                 let (force, damper) = (force * count, damper * count);
                 if matches!(grip.drive, Drive::Hand { .. }) {
                     scratch.freedom[2 * i] = Freedom::Led { force: direction * force, damper, from };
@@ -500,7 +558,8 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                     scratch.joint_on[i] = false;
                 }
                 let stiffness = |e: usize| model.section[e].bend / (0.5 * model.rest_length[e]);
-                let sides = [(i > first).then(|| (i - 1, false)), (i < first + rod.n_elements as usize).then_some((i, true))];
+                let sides =
+                    [(i > first).then(|| (i - 1, false)), (i < first + rod.n_elements as usize).then_some((i, true))];
                 for (e, before) in sides.into_iter().flatten() {
                     // Damping acts against the clamp's own orientation.
                     let held = |t: f64| grip_pose(grip, interval, t).orientation;
@@ -512,7 +571,9 @@ fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
                         |weights| {
                             let at_start = pair(held(began), origin.orientation[e]);
                             let turning = log(pose.orientation * held(began).conjugate()) / stage.end;
-                            let rate = |at: [DQuat; 2], w: DVec3| strain::joint_rate(at, if before { [turning, w] } else { [w, turning] }, grip.rest_half);
+                            let rate = |at: [DQuat; 2], w: DVec3| {
+                                strain::joint_rate(at, if before { [turning, w] } else { [w, turning] }, grip.rest_half)
+                            };
                             let [w0, w1] = integrator::spins(model, origin, state, h, e);
                             angle(at_start) + rate(at_start, w0) * weights[0] + rate(now, w1) * weights[1]
                         },
@@ -564,7 +625,8 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, stage: &Stage
     for (rod, _) in &scratch.rods {
         for e in rod.start..rod.end - 1 {
             let strain = crate::rod::element_strain(model, state, e);
-            state.tension[e] = if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
+            state.tension[e] =
+                if model.inextensible[e] { scratch.tension[e] } else { strain.z * model.stretch_stiffness[e].z };
         }
     }
     yield_plastic(model, state);
@@ -573,7 +635,8 @@ fn accept(model: &Model, state: &mut State, scratch: &mut Scratch, stage: &Stage
     reactions(model, state, scratch, stage.span);
 }
 
-/// Bend and twist beyond yield become permanent (return mapping with isotropic hardening, bending radially in the two directions).
+/// Bend and twist beyond yield become permanent (return mapping with isotropic hardening, bending radially in the two
+/// directions).
 fn yield_plastic(model: &Model, state: &mut State) {
     for (_, rod) in model.rods.iter() {
         let Some(p) = rod.material.plasticity else { continue };

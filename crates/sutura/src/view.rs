@@ -1,4 +1,5 @@
-//! Reading a world: slices of its arrays, and what is derived from them. The same views are given to an observer of accepted substeps.
+//! Reading a world: slices of its arrays, and what is derived from them. The same views are given to an observer of
+//! accepted substeps.
 
 use crate::math::{Pose, log};
 use crate::model::Model;
@@ -152,7 +153,8 @@ impl<'a> RodView<'a> {
     pub fn slot(&self) -> usize {
         self.slot as usize
     }
-    /// Number of elements n; there are n + 1 particles and n - 1 joints. A closed thread's last particle is at its first, and it has n joints.
+    /// Number of elements n; there are n + 1 particles and n - 1 joints. A closed thread's last particle is at its
+    /// first, and it has n joints.
     pub fn n_elements(&self) -> usize {
         self.rod.n_elements as usize
     }
@@ -202,7 +204,8 @@ impl<'a> RodView<'a> {
     pub fn axial_stiffness(&self, element: usize) -> f64 {
         self.section(element).ea
     }
-    /// Bending stiffness E I about d1 and d2 and twisting stiffness G J of an element, bending scale included \[N m^2\].
+    /// Bending stiffness E I about d1 and d2 and twisting stiffness G J of an element, bending scale included \[N
+    /// m^2\].
     pub fn bending_stiffness(&self, element: usize) -> DVec3 {
         self.section(element).bend
     }
@@ -249,8 +252,8 @@ impl<'a> RodView<'a> {
     pub fn internal_force(&self, element: usize) -> DVec3 {
         crate::rod::internal_force(self.model, self.state, self.rod, self.rod.first as usize + element)
     }
-    /// Bend and twist of a joint (between elements `joint` and `joint + 1`; that of a closed thread's seam is the last) less its rest value, along d1,
-    /// d2, d3 of the frame halfway \[1/m\].
+    /// Bend and twist of a joint (between elements `joint` and `joint + 1`; that of a closed thread's seam is the last)
+    /// less its rest value, along d1, d2, d3 of the frame halfway \[1/m\].
     pub fn strain(&self, joint: usize) -> DVec3 {
         let f = self.rod.first as usize + joint + 1;
         if self.model.weld_of[f].is_none() {
@@ -259,13 +262,16 @@ impl<'a> RodView<'a> {
         let length = 0.5 * (self.rest_lengths()[joint] + self.rest_lengths()[(joint + 1) % self.n_elements()]);
         crate::rod::welded_joint(self.model, self.state, self.rod, f).map(|(angle, _)| angle).sum::<DVec3>() / length
     }
-    /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\], at a weld the mean of both sides. Damping is not part of it.
+    /// Elastic bending (components 1, 2) and twisting (3) moment carried by a joint \[N m\], at a weld the mean of both
+    /// sides. Damping is not part of it.
     pub fn moment(&self, joint: usize) -> DVec3 {
         let f = self.rod.first as usize + joint + 1;
         if self.model.weld_of[f].is_none() {
             return crate::rod::joint_angle(self.model, self.state, f) * self.model.bend_stiffness[f];
         }
-        crate::rod::welded_joint(self.model, self.state, self.rod, f).map(|(angle, stiffness)| angle * stiffness * 0.5).sum()
+        crate::rod::welded_joint(self.model, self.state, self.rod, f)
+            .map(|(angle, stiffness)| angle * stiffness * 0.5)
+            .sum()
     }
     /// Largest |length - rest length| / rest length of an element.
     pub fn max_elongation(&self) -> f64 {
@@ -293,8 +299,9 @@ impl<'a> RodView<'a> {
         }
         (length > 0.0).then(|| sum / length)
     }
-    /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is kept). At the seam of a closed
-    /// thread the twist at rest does not count, so that it is what was put in before closing.
+    /// Twist Tw of the material frames about the centerline, in turns (angle by parallel transport, so that Tw + Wr is
+    /// kept). At the seam of a closed thread the twist at rest does not count, so that it is what was put in before
+    /// closing.
     pub fn twist(&self) -> f64 {
         let q = self.orientations();
         let mut angle = 0.0;

@@ -62,10 +62,11 @@ impl World {
     }
     /// Changes the settings, the solver among them.
     ///
-    /// From [`Solver::Direct`] to [`Solver::Paper`] only where the world has nothing that the paper has not: an error says what it has. (Where such a
-    /// thing comes later, the steps say so.) Positions, velocities and poses go on; tensions, contact forces and the forces of grips end.
-    /// Back to the direct solver tensions are those of the strains that the paper's solver has left, lengths that are constraints become so within the
-    /// next substep, contacts are found anew with threads on the sides where they are now, and what lies in each other parts.
+    /// From [`Solver::Direct`] to [`Solver::Paper`] only where the world has nothing that the paper has not: an error
+    /// says what it has. (Where such a thing comes later, the steps say so.) Positions, velocities and poses go on;
+    /// tensions, contact forces and the forces of grips end. Back to the direct solver tensions are those of the
+    /// strains that the paper's solver has left, lengths that are constraints become so within the next substep,
+    /// contacts are found anew with threads on the sides where they are now, and what lies in each other parts.
     pub fn set_settings(&mut self, settings: Settings) -> Result<(), Error> {
         settings.validate()?;
         let (before, after) = (self.model.settings.solver, settings.solver);
@@ -73,7 +74,12 @@ impl World {
             && after != Solver::Direct
             && let Some(what) = crate::pbd::unknown(&self.model, &self.state)
         {
-            return Err(Error::invalid("settings", "solver", what, "the direct solver, in a world with what that of the paper does not know"));
+            return Err(Error::invalid(
+                "settings",
+                "solver",
+                what,
+                "the direct solver, in a world with what that of the paper does not know",
+            ));
         }
         self.model.settings = settings;
         self.state.interrupt(Onset::Unknown);
@@ -84,12 +90,14 @@ impl World {
     }
     /// Limits the work of each step from now on, or no longer (`None`, as a world begins).
     ///
-    /// Work is counted in multiply-adds, roughly: 1e9 are about a second of one core. It is counted and not timed, so what a step does is the same on any
-    /// machine; who wants a frame within a time measures what a count takes there ([`StepReport::work`]). Where a step has spent it, it ends with the last
-    /// substep that was accepted: its state is as good as any, but [`StepReport::simulated`] is less than the time wanted, and the time of the world is less by
-    /// what is missing. Step on by that, or let everything be in slow motion. What grips and driven shapes are wanted to reach is reached in part. A step that
-    /// finds no substep within its limit leaves everything as it was, and the next one tries a shorter substep; after a few such steps one is found, whatever
-    /// it takes. The paper's solver takes no notice.
+    /// Work is counted in multiply-adds, roughly: 1e9 are about a second of one core. It is counted and not timed, so
+    /// what a step does is the same on any machine; who wants a frame within a time measures what a count takes there
+    /// ([`StepReport::work`]). Where a step has spent it, it ends with the last substep that was accepted: its state is
+    /// as good as any, but [`StepReport::simulated`] is less than the time wanted, and the time of the world is less by
+    /// what is missing. Step on by that, or let everything be in slow motion. What grips and driven shapes are wanted
+    /// to reach is reached in part. A step that finds no substep within its limit leaves everything as it was, and the
+    /// next one tries a shorter substep; after a few such steps one is found, whatever it takes. The paper's solver
+    /// takes no notice.
     pub fn set_step_work(&mut self, most: Option<f64>) -> Result<(), Error> {
         if let Some(most) = most {
             check("world", "step_work", most, most > 0.0, "a finite number > 0")?;
@@ -179,7 +187,10 @@ impl World {
         if let Some([before, after]) = low.seam {
             let member = |particle, before, after| Member { rod: handle.index, particle, before, after };
             let orientation = row::weld::between(low.frames[n - 1], low.frames[0], before * after);
-            self.join(vec![member(n as u32, Some(Side::along(before)), None), member(0, None, Some(Side::along(after)))], orientation);
+            self.join(
+                vec![member(n as u32, Some(Side::along(before)), None), member(0, None, Some(Side::along(after)))],
+                orientation,
+            );
         }
         Ok(handle)
     }
@@ -194,14 +205,15 @@ impl World {
         }
     }
 
-    /// Makes a thread that is in the world of another material, checked as that of a new one. [`Along`](crate::Along) goes on to hold: modulus and
-    /// density are multiplied along the thread as they were.
+    /// Makes a thread that is in the world of another material, checked as that of a new one. [`Along`](crate::Along)
+    /// goes on to hold: modulus and density are multiplied along the thread as they were.
     ///
-    /// Where the thread is and how fast it moves stays, and so does its shape at rest with the plastic set that it has (also where the new material takes
-    /// none) and the hardening, which is counted in strains at yield. Forces follow: tensions of an elastic thread and all moments are those of
-    /// the present strains from here on, momentum is that of the present velocities. The tensions of an inextensible thread, contact forces and
-    /// the forces of grips are those of the last substep until the next one. What is bent beyond a new yield yields in the next substep.
-    /// The integrator starts anew, as after any other edit.
+    /// Where the thread is and how fast it moves stays, and so does its shape at rest with the plastic set that it has
+    /// (also where the new material takes none) and the hardening, which is counted in strains at yield. Forces follow:
+    /// tensions of an elastic thread and all moments are those of the present strains from here on, momentum is that of
+    /// the present velocities. The tensions of an inextensible thread, contact forces and the forces of grips are those
+    /// of the last substep until the next one. What is bent beyond a new yield yields in the next substep. The
+    /// integrator starts anew, as after any other edit.
     pub fn set_material(&mut self, rod: Handle<Rod>, material: &Material) -> Result<(), Error> {
         material.validate()?;
         let model = &self.model;
@@ -213,10 +225,10 @@ impl World {
         self.remake(rod, change, |model| model.set_material(rod.index, old, &old_sections))
     }
 
-    /// Lets a thread that is in the world stretch, or keeps it from stretching. One that is stretched shrinks to its rest length within the next
-    /// substep, with the jolt that this is, or goes on as it is where what holds it does not give way, and the step says so. One that begins to
-    /// stretch carries no tension at first: what it bore lengthens it.
-    /// Not where a brake pays it out, which wants one that stretches.
+    /// Lets a thread that is in the world stretch, or keeps it from stretching. One that is stretched shrinks to its
+    /// rest length within the next substep, with the jolt that this is, or goes on as it is where what holds it does
+    /// not give way, and the step says so. One that begins to stretch carries no tension at first: what it bore
+    /// lengthens it. Not where a brake pays it out, which wants one that stretches.
     pub fn set_stretch(&mut self, rod: Handle<Rod>, stretch: Stretch) -> Result<(), Error> {
         let old = self.model.rods.get(rod).ok_or(ROD)?.stretch;
         let brake = |r: &ReelState| r.rod == rod.index && matches!(r.law, ReelLaw::Brake(_));
@@ -227,7 +239,12 @@ impl World {
     }
 
     /// Changes stiffness or mass of a thread; puts them back where that leaves the world out of all proportion.
-    fn remake(&mut self, rod: Handle<Rod>, change: impl FnOnce(&mut Model), back: impl FnOnce(&mut Model)) -> Result<(), Error> {
+    fn remake(
+        &mut self,
+        rod: Handle<Rod>,
+        change: impl FnOnce(&mut Model),
+        back: impl FnOnce(&mut Model),
+    ) -> Result<(), Error> {
         let elements = self.model.rods.get(rod).ok_or(ROD)?.elements();
         let tension = self.state.tension[elements.clone()].to_vec();
         change(&mut self.model);
@@ -237,13 +254,19 @@ impl World {
             back(&mut self.model);
             self.model.refresh_masses(&self.state.loads);
             self.state.tension[elements].copy_from_slice(&tension);
-            return Err(Error::invalid("rod", "material", "out of all proportion", "numbers with which the energy of the world is finite"));
+            return Err(Error::invalid(
+                "rod",
+                "material",
+                "out of all proportion",
+                "numbers with which the energy of the world is finite",
+            ));
         }
         self.state.interrupt(Onset::Unknown);
         Ok(())
     }
 
-    /// Removes a thread with its grips and loads. What it was welded to comes apart where fewer than two threads are left.
+    /// Removes a thread with its grips and loads. What it was welded to comes apart where fewer than two threads are
+    /// left.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
         let gone = self.model.rods.remove(rod).ok_or(ROD)?;
         self.state.interrupt(Onset::Unknown);
@@ -294,7 +317,8 @@ impl World {
         for (_, weld) in model.welds.iter_mut() {
             weld.members.retain(|m| m.rod != rod.index);
         }
-        let apart: Vec<WeldModel> = model.welds.iter().map(|(_, w)| w).filter(|w| w.members.len() < 2).cloned().collect();
+        let apart: Vec<WeldModel> =
+            model.welds.iter().map(|(_, w)| w).filter(|w| w.members.len() < 2).cloned().collect();
         model.welds.retain(|w| w.members.len() >= 2);
         model.refresh_welds();
         state.reels.retain(|r| r.rod != rod.index);
@@ -302,7 +326,8 @@ impl World {
         Ok(())
     }
 
-    /// Joins places of threads. Where they lie apart (by a tenth of a radius at most) they meet in the middle, or at the one that is held.
+    /// Joins places of threads. Where they lie apart (by a tenth of a radius at most) they meet in the middle, or at
+    /// the one that is held.
     pub fn insert_weld(&mut self, spec: &WeldSpec) -> Result<Handle<Weld>, Error> {
         spec.validate()?;
         let (model, state) = (&self.model, &self.state);
@@ -312,7 +337,11 @@ impl World {
             place.validate("weld", model, r)?;
             let particle = place.particle(model, r);
             let i = (r.first + particle) as usize;
-            if state.reels.iter().any(|(_, reel)| reel.rod == rod.index && particle == if reel.at_end { r.n_elements } else { 0 }) {
+            if state
+                .reels
+                .iter()
+                .any(|(_, reel)| reel.rod == rod.index && particle == if reel.at_end { r.n_elements } else { 0 })
+            {
                 return Err(Error::invalid("weld", "places", place, "an end that has no reel"));
             }
             if model.weld_of[i].is_some() || places.iter().any(|p| p.2 == i) {
@@ -328,15 +357,24 @@ impl World {
         }
         let held: Vec<usize> = places.iter().map(|p| p.2).filter(|i| crate::reel::held(model, state, *i)).collect();
         if held.len() > 1 {
-            return Err(Error::invalid("weld", "places", format!("{} held", held.len()), "at most one place that a grip holds"));
+            return Err(Error::invalid(
+                "weld",
+                "places",
+                format!("{} held", held.len()),
+                "at most one place that a grip holds",
+            ));
         }
         let frames = |(slot, particle, i): (u32, u32, usize)| {
             let n = model.rods.at(slot).expect("just read").n_elements;
             ((particle > 0).then(|| state.orientation[i - 1]), (particle < n).then(|| state.orientation[i]))
         };
-        // What a clamp holds there it goes on holding. Else a thread that goes on through the weld decides how its cross-section is turned, or the first
-        // one that ends there.
-        let clamp = state.grips.iter().map(|(_, g)| g).find(|g| g.hold == Hold::Clamp && places.iter().any(|p| (p.0, p.1) == (g.rod, g.index)));
+        // What a clamp holds there it goes on holding. Else a thread that goes on through the weld decides how its
+        // cross-section is turned, or the first one that ends there.
+        let clamp = state
+            .grips
+            .iter()
+            .map(|(_, g)| g)
+            .find(|g| g.hold == Hold::Clamp && places.iter().any(|p| (p.0, p.1) == (g.rod, g.index)));
         if let Some(k) = clamp.and_then(|g| places.iter().position(|p| (p.0, p.1) == (g.rod, g.index))) {
             places.swap(0, k);
         }
@@ -345,7 +383,12 @@ impl World {
             _ => None,
         };
         let (before, after) = frames(places[0]);
-        let orientation = clamp.map(|g| g.pose.orientation).or_else(|| places.iter().find_map(through)).or(before).or(after).expect("a thread has frames");
+        let orientation = clamp
+            .map(|g| g.pose.orientation)
+            .or_else(|| places.iter().find_map(through))
+            .or(before)
+            .or(after)
+            .expect("a thread has frames");
         let straight = |q: DQuat, outward: DVec3| match spec.rest {
             WeldRest::AsInserted => q,
             // Turned so that it goes on where the first one leads.
@@ -359,7 +402,12 @@ impl World {
             let (rod, particle, i) = *place;
             let (before, after) = match frames(*place) {
                 (Some(_), Some(_)) if spec.rest == WeldRest::Straight => {
-                    return Err(Error::invalid("weld", "places", particle, "ends of threads where they go on straight"));
+                    return Err(Error::invalid(
+                        "weld",
+                        "places",
+                        particle,
+                        "ends of threads where they go on straight",
+                    ));
                 }
                 (a, b) if k == 0 && clamp.is_some() => {
                     let held = Side::along(clamp.map_or(DQuat::IDENTITY, |g| g.rest_half));
@@ -371,9 +419,10 @@ impl World {
                     (Some(side), Some(side))
                 }
                 (a, b) if k == 0 => (a.map(|q| Side::turned(orientation, q)), b.map(|q| Side::turned(orientation, q))),
-                (a, b) => {
-                    (a.map(|q| Side::turned(orientation, straight(q, q * DVec3::NEG_Z))), b.map(|q| Side::turned(orientation, straight(q, q * DVec3::Z))))
-                }
+                (a, b) => (
+                    a.map(|q| Side::turned(orientation, straight(q, q * DVec3::NEG_Z))),
+                    b.map(|q| Side::turned(orientation, straight(q, q * DVec3::Z))),
+                ),
             };
             members.push(Member { rod, particle, before, after });
         }
@@ -389,8 +438,8 @@ impl World {
         Ok(self.join(members, orientation))
     }
 
-    /// Takes a weld apart. A thread that went through it goes on, ends are free. A clamp there goes on holding its own thread as it is: its pose turns
-    /// from the cross-section of the weld to that of the thread.
+    /// Takes a weld apart. A thread that went through it goes on, ends are free. A clamp there goes on holding its own
+    /// thread as it is: its pose turns from the cross-section of the weld to that of the thread.
     /// What lay in each other at the weld touches from now on, and is pushed apart.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
         let gone = self.model.welds.remove(weld).ok_or(WELD)?;
@@ -400,7 +449,8 @@ impl World {
         Ok(())
     }
 
-    /// Clamps at a weld that is gone hold the cross-section of their own thread from now on, with the moment that it carries.
+    /// Clamps at a weld that is gone hold the cross-section of their own thread from now on, with the moment that it
+    /// carries.
     fn hold_alone(&mut self, gone: &WeldModel) {
         for g in self.state.grips.iter_mut().map(|(_, g)| g).filter(|g| g.hold == Hold::Clamp) {
             let member = gone.members.iter().find(|m| (m.rod, m.particle) == (g.rod, g.index));
@@ -437,7 +487,16 @@ impl World {
         let Checked { geometry, closed, container, notes } = spec.check()?;
         let collider = crate::collide::Collider::new(&geometry)?;
         let hash = crate::snapshot::hash_of(&geometry);
-        let shape = ShapeModel { geometry, hash, collider, surface: spec.surface, motion: spec.motion, closed, container, notes };
+        let shape = ShapeModel {
+            geometry,
+            hash,
+            collider,
+            surface: spec.surface,
+            motion: spec.motion,
+            closed,
+            container,
+            notes,
+        };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
         self.model.placed.shapes.push(handle.index);
         let n = self.model.shapes.len();
@@ -492,13 +551,22 @@ impl World {
         };
         let first = (rod.first + index) as usize;
         let wanted = first..=first + usize::from(spec.hold == Hold::Jaw);
-        let welded = wanted.clone().filter_map(|i| self.model.weld_of[i]).flat_map(|w| self.model.welds.at(w).into_iter().flat_map(|w| &w.members));
-        if wanted.clone().chain(welded.map(|m| m.index(&self.model))).any(|i| crate::reel::held(&self.model, &self.state, i)) {
+        let welded = wanted
+            .clone()
+            .filter_map(|i| self.model.weld_of[i])
+            .flat_map(|w| self.model.welds.at(w).into_iter().flat_map(|w| &w.members));
+        if wanted
+            .clone()
+            .chain(welded.map(|m| m.index(&self.model)))
+            .any(|i| crate::reel::held(&self.model, &self.state, i))
+        {
             return Err(Error::invalid("grip", "place", spec.place, "a piece that no other grip holds"));
         }
         let i = (rod.first + index) as usize;
         let state = &self.state;
-        if spec.hold == Hold::Jaw && state.reels.iter().any(|(_, r)| r.rod == spec.rod.index && r.element(&self.model) == i) {
+        if spec.hold == Hold::Jaw
+            && state.reels.iter().any(|(_, r)| r.rod == spec.rod.index && r.element(&self.model) == i)
+        {
             return Err(Error::invalid("grip", "place", spec.place, "an element that is not at a reel, for a jaw"));
         }
         let (mut rest_half, mut half_span) = (DQuat::IDENTITY, DVec3::ZERO);
@@ -511,7 +579,8 @@ impl World {
                     rest_half = crate::math::half(self.model.rest_half[j]);
                 }
                 let welded = self.model.weld_of[i].map(|w| state.weld_orientation[w as usize]);
-                let (before, after) = ((index > 0).then(|| state.orientation[i - 1]), (index < n).then(|| state.orientation[i]));
+                let (before, after) =
+                    ((index > 0).then(|| state.orientation[i - 1]), (index < n).then(|| state.orientation[i]));
                 let q = welded.unwrap_or_else(|| crate::step::clamp_orientation(before, after, rest_half));
                 (state.position[i], q, state.velocity[i], state.angular_velocity[if index < n { i } else { i - 1 }])
             }
@@ -549,8 +618,8 @@ impl World {
         Ok(())
     }
 
-    /// Pose wanted at the end of the next step for a pose-driven grip. A pin ignores the orientation. The orientation of a clamp or
-    /// jaw is that of the material frame held (`world_from_material`).
+    /// Pose wanted at the end of the next step for a pose-driven grip. A pin ignores the orientation. The orientation
+    /// of a clamp or jaw is that of the material frame held (`world_from_material`).
     pub fn set_grip_pose(&mut self, grip: Handle<Grip>, pose: Pose) -> Result<(), Error> {
         let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
         if !pose.is_valid() {
@@ -641,7 +710,12 @@ impl World {
             return Err(Error::invalid("reel", "at_end", spec.at_end, "an end that is not welded"));
         }
         if !crate::reel::suits(model, rod) {
-            return Err(Error::invalid("reel", "rod", spec.rod, "a thread of two elements or more, of one section, straight at rest"));
+            return Err(Error::invalid(
+                "reel",
+                "rod",
+                spec.rod,
+                "a thread of two elements or more, of one section, straight at rest",
+            ));
         }
         let jaw = |g: &GripState| g.rod == spec.rod.index && g.hold == Hold::Jaw && (rod.first + g.index) as usize == e;
         if state.grips.iter().any(|(_, g)| jaw(g)) {
@@ -649,7 +723,15 @@ impl World {
         }
         let nominal = model.rest_length[e];
         self.state.interrupt(Onset::Unknown);
-        let reel = ReelState { rod: spec.rod.index, at_end: spec.at_end, law: spec.law, supply: spec.supply, nominal, fed: 0.0, added: 0 };
+        let reel = ReelState {
+            rod: spec.rod.index,
+            at_end: spec.at_end,
+            law: spec.law,
+            supply: spec.supply,
+            nominal,
+            fed: 0.0,
+            added: 0,
+        };
         Ok(self.state.reels.insert(reel))
     }
 
@@ -711,10 +793,16 @@ impl World {
     /// Reads a shape.
     pub fn shape(&self, shape: Handle<Shape>) -> Result<ShapeView<'_>, Error> {
         let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
-        Ok(ShapeView { geometry: &s.geometry, pose: self.state.shape_pose[shape.index()], motion: s.motion, surface: s.surface, slot: shape.index() })
+        Ok(ShapeView {
+            geometry: &s.geometry,
+            pose: self.state.shape_pose[shape.index()],
+            motion: s.motion,
+            surface: s.surface,
+            slot: shape.index(),
+        })
     }
-    /// What was mended of a mesh when it was inserted, and what may not have been meant: that it is open and where, that it is a container. Each is a
-    /// sentence without its full stop.
+    /// What was mended of a mesh when it was inserted, and what may not have been meant: that it is open and where,
+    /// that it is a container. Each is a sentence without its full stop.
     pub fn shape_notes(&self, shape: Handle<Shape>) -> Result<&[String], Error> {
         Ok(&self.model.shapes.get(shape).ok_or(SHAPE)?.notes)
     }
@@ -758,9 +846,10 @@ impl World {
         threads.chain(shapes)
     }
 
-    /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it. What neighbors along a thread or through
-    /// a weld is left out, and so is what overlaps by less than a tenth of a diameter, as loaded contacts and arcs cut into chords do. The first step after
-    /// [`World::insert_rod`] and [`World::insert_shape`] says it of what was inserted ([`IncidentKind::Overlap`]).
+    /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it.
+    /// What neighbors along a thread or through a weld is left out, and so is what overlaps by less than a tenth of a
+    /// diameter, as loaded contacts and arcs cut into chords do. The first step after [`World::insert_rod`] and
+    /// [`World::insert_shape`] says it of what was inserted ([`IncidentKind::Overlap`]).
     pub fn overlaps(&self) -> Vec<Overlap> {
         crate::collide::overlap::overlaps(&self.model, &self.state)
     }
@@ -775,17 +864,23 @@ impl World {
         self.step_with(dt, &mut |_| {})
     }
 
-    /// The same; `observe` sees every accepted substep (an audit, a recorder), and once more the state before one for which elements at a reel were
-    /// cut or joined.
+    /// The same; `observe` sees every accepted substep (an audit, a recorder), and once more the state before one for
+    /// which elements at a reel were cut or joined.
     pub fn step_with(&mut self, dt: f64, observe: &mut dyn FnMut(View<'_>)) -> StepReport {
         let start = self.state.time;
         let mut report = StepReport { time: start, ..StepReport::default() };
         if !(dt.is_finite() && dt > 0.0) {
-            report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is not a finite number > 0" } });
+            report.incidents.push(Incident {
+                time: start,
+                kind: IncidentKind::BadInput { what: "the time step is not a finite number > 0" },
+            });
             return report;
         }
         if dt / self.model.settings.substep > MOST_SUBSTEPS {
-            report.incidents.push(Incident { time: start, kind: IncidentKind::BadInput { what: "the time step is more than a million substeps" } });
+            report.incidents.push(Incident {
+                time: start,
+                kind: IncidentKind::BadInput { what: "the time step is more than a million substeps" },
+            });
             return report;
         }
         let placed = core::mem::take(&mut self.model.placed);
@@ -814,7 +909,9 @@ impl World {
             OverlapWith::Shape(shape) => put(o.rod) || placed.shapes.contains(&shape.index),
         };
         let time = report.time;
-        report.incidents.extend(self.overlaps().into_iter().filter(one).map(|o| Incident { time, kind: IncidentKind::Overlap(o) }));
+        report
+            .incidents
+            .extend(self.overlaps().into_iter().filter(one).map(|o| Incident { time, kind: IncidentKind::Overlap(o) }));
     }
 
     /// A driven thing that is to move farther in a step than at 100 m/s was placed there, not moved.
@@ -847,8 +944,10 @@ impl World {
         let mut worst = 0.0f64;
         for (_, rod) in self.model.rods.iter() {
             for e in rod.elements() {
-                let strain = (self.state.position[e + 1] - self.state.position[e]).length() / self.model.rest_length[e] - 1.0;
-                let want = if self.model.inextensible[e] { 0.0 } else { self.state.tension[e] / self.model.section[e].ea };
+                let strain =
+                    (self.state.position[e + 1] - self.state.position[e]).length() / self.model.rest_length[e] - 1.0;
+                let want =
+                    if self.model.inextensible[e] { 0.0 } else { self.state.tension[e] / self.model.section[e].ea };
                 worst = worst.max((strain - want).abs());
             }
         }
@@ -860,13 +959,15 @@ impl World {
         crate::snapshot::write(&self.model, &self.state)
     }
 
-    /// Takes the world back to a snapshot of a world with the same threads, shapes and welds. On error nothing is changed; it says what differs: number and
-    /// rest lengths of elements, radius, section, rest shape, whether a thread is closed, the geometry of a shape, the places of a weld. (Of a snapshot of an
-    /// earlier version lengths and numbers are compared, since it says no more.)
+    /// Takes the world back to a snapshot of a world with the same threads, shapes and welds. On error nothing is
+    /// changed; it says what differs: number and rest lengths of elements, radius, section, rest shape, whether a
+    /// thread is closed, the geometry of a shape, the places of a weld. (Of a snapshot of an earlier version lengths
+    /// and numbers are compared, since it says no more.)
     ///
-    /// Materials, settings and friction are the model's: they stay as they are now. Where threads were of another material, or stretched otherwise, when the
-    /// snapshot was taken, its strains, velocities and plastic set are taken over, tensions follow the strains, and the integrator starts anew, as if
-    /// [`World::set_material`] came after it. Else what follows is the same to the bit.
+    /// Materials, settings and friction are the model's: they stay as they are now. Where threads were of another
+    /// material, or stretched otherwise, when the snapshot was taken, its strains, velocities and plastic set are taken
+    /// over, tensions follow the strains, and the integrator starts anew, as if [`World::set_material`] came after it.
+    /// Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let Snapshot { materials, build, state } = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
@@ -886,7 +987,11 @@ impl World {
             }
         }
         // Finite numbers may be so large that what is worked out from them, with the masses that they attach, is not.
-        let sound = fits.and_then(|()| crate::rod::in_proportion(&self.model, &self.state).then_some(()).ok_or("a number in it is out of all proportion"));
+        let sound = fits.and_then(|()| {
+            crate::rod::in_proportion(&self.model, &self.state)
+                .then_some(())
+                .ok_or("a number in it is out of all proportion")
+        });
         if let Err(reason) = sound {
             crate::reel::refit(&mut self.model, &state, &before);
             self.take_up(&before);
@@ -927,7 +1032,14 @@ impl World {
         if s.shape_pose.len() != self.model.shapes.len() || s.shape_target.len() != s.shape_pose.len() {
             return Err("it is of a world with other shapes");
         }
-        let vectors = s.position.iter().chain(&s.velocity).chain(&s.angular_velocity).chain(&s.acceleration).chain(&s.angular_acceleration).chain(&s.plastic);
+        let vectors = s
+            .position
+            .iter()
+            .chain(&s.velocity)
+            .chain(&s.angular_velocity)
+            .chain(&s.acceleration)
+            .chain(&s.angular_acceleration)
+            .chain(&s.plastic);
         let finite = vectors.into_iter().all(|v| v.is_finite())
             && s.orientation.iter().chain(&s.weld_orientation).all(|q| (q.length() - 1.0).abs() < 1e-6)
             && s.tension.iter().chain(&s.hardened).all(|v| v.is_finite())
@@ -940,8 +1052,10 @@ impl World {
         for (_, g) in s.grips.iter() {
             let rod = self.model.rods.at(g.rod).ok_or("a grip holds a thread that is not here")?;
             let last = if g.hold == Hold::Jaw { rod.n_elements - 1 } else { rod.n_elements };
-            let poses = g.pose.is_valid() && g.target.is_valid() && g.taken_pose.is_valid() && g.rest_half.is_normalized();
-            let vectors = [g.half_span, g.taken_velocity, g.taken_spin, g.force, g.torque].iter().all(|v| v.is_finite());
+            let poses =
+                g.pose.is_valid() && g.target.is_valid() && g.taken_pose.is_valid() && g.rest_half.is_normalized();
+            let vectors =
+                [g.half_span, g.taken_velocity, g.taken_spin, g.force, g.torque].iter().all(|v| v.is_finite());
             let times = g.ramp.is_finite() && g.ramp >= 0.0 && g.taken_at.is_finite();
             if g.index > last || g.drive.validate().is_err() || !poses || !vectors || !times {
                 return Err("a grip is out of range");
@@ -957,13 +1071,24 @@ impl World {
         }
         let element = |e: u32| (e as usize) < n && self.model.is_element(e as usize);
         let place = |s: f64| (0.0..=1.0).contains(&s);
-        let forces =
-            |normal: DVec3, normal_force: f64, friction: DVec3| (normal.length() - 1.0).abs() < 1e-6 && normal_force.is_finite() && friction.is_finite();
+        let forces = |normal: DVec3, normal_force: f64, friction: DVec3| {
+            (normal.length() - 1.0).abs() < 1e-6 && normal_force.is_finite() && friction.is_finite()
+        };
         let threads = s.thread_contacts.iter().all(|c| {
-            element(c.a) && element(c.b) && c.a < c.b && place(c.s) && place(c.t) && forces(c.normal, c.normal_force, c.friction) && c.drift.is_finite()
+            element(c.a)
+                && element(c.b)
+                && c.a < c.b
+                && place(c.s)
+                && place(c.t)
+                && forces(c.normal, c.normal_force, c.friction)
+                && c.drift.is_finite()
         });
         let shapes = s.shape_contacts.iter().all(|c| {
-            element(c.element) && self.model.shapes.at(c.shape).is_some() && place(c.s) && forces(c.normal, c.normal_force, c.friction) && c.drift.is_finite()
+            element(c.element)
+                && self.model.shapes.at(c.shape).is_some()
+                && place(c.s)
+                && forces(c.normal, c.normal_force, c.friction)
+                && c.drift.is_finite()
         });
         if !(threads && shapes) {
             return Err("a contact is out of range");

@@ -1,15 +1,15 @@
 //! The step allocates nothing once its working memory has grown to what the motion needs.
 //!
-//! Warm-up is the same motion, run once: the world is then put back to its start by a snapshot and the motion runs again, bit for bit,
-//! so that whatever it allocates it would allocate for ever.
+//! Warm-up is the same motion, run once: the world is then put back to its start by a snapshot and the motion runs
+//! again, bit for bit, so that whatever it allocates it would allocate for ever.
 
 mod support;
 
 use support::{overhand, quiet, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Friction, Geometry, GripSpec, Handle, Hold, Incident, IncidentKind, Integrator, LoadKind, LoadSpec, Material, Place, Pose, ReelLaw, ReelSpec,
-    RodSpec, Settings, ShapeSpec, Stretch, WeldSpec, World,
+    Drive, Friction, Geometry, GripSpec, Handle, Hold, Incident, IncidentKind, Integrator, LoadKind, LoadSpec,
+    Material, Place, Pose, ReelLaw, ReelSpec, RodSpec, Settings, ShapeSpec, Stretch, WeldSpec, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -37,7 +37,8 @@ fn second_run(world: &mut World, frames: u32, mut drive: impl FnMut(&mut World, 
             let mut report = None;
             let info = allocation_counter::measure(|| report = Some(world.step(DT)));
             let report = report.unwrap();
-            // A report of an incident is a vector that grows; here there are none, but for what the first step of all says of how the thread lies.
+            // A report of an incident is a vector that grows; here there are none, but for what the first step of all
+            // says of how the thread lies.
             let known = |i: &Incident| run == 0 && frame == 0 && matches!(i.kind, IncidentKind::Overlap(_));
             assert!(report.incidents.iter().all(known), "frame {frame}: {:?}", report.incidents);
             if run == 1 {
@@ -62,9 +63,11 @@ fn the_counter_sees_an_allocation() {
 #[test]
 fn a_swinging_thread() {
     let (material, radius) = t1();
-    for (stretch, integrator) in
-        [(Stretch::Elastic, Integrator::ImplicitEuler), (Stretch::Inextensible, Integrator::ImplicitEuler), (Stretch::Elastic, Integrator::TrBdf2)]
-    {
+    for (stretch, integrator) in [
+        (Stretch::Elastic, Integrator::ImplicitEuler),
+        (Stretch::Inextensible, Integrator::ImplicitEuler),
+        (Stretch::Elastic, Integrator::TrBdf2),
+    ] {
         let spec = RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 60, radius, material.clone()) };
         let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
         let rod = world.insert_rod(&spec).unwrap();
@@ -122,7 +125,8 @@ fn grips_driven_by_pose_and_by_force_and_a_torque() {
     let home = world.grip_pose(clamp).unwrap();
     let second = second_run(&mut world, 60, |world, frame| {
         let s = f64::from(frame + 1) * DT;
-        let pose = Pose::new(home.position + DVec3::X * (0.005 * s), DQuat::from_rotation_y(0.3 * s) * home.orientation);
+        let pose =
+            Pose::new(home.position + DVec3::X * (0.005 * s), DQuat::from_rotation_y(0.3 * s) * home.orientation);
         world.set_grip_pose(clamp, pose).unwrap();
     });
     assert_eq!(second.allocations, 0, "{second:?}");
@@ -133,13 +137,16 @@ fn a_thread_that_slides_over_a_cylinder() {
     let radius = 0.15e-3;
     let material = Material { bend_scale: 0.05, bend_damping: 0.01, ..Material::elastic(2e9, 1150.0) };
     let cylinder = 5e-3;
-    let mut world = World::new(Settings { friction: Friction { stick: 0.1, slide: 0.08 }, ..Settings::default() }).unwrap();
+    let mut world =
+        World::new(Settings { friction: Friction { stick: 0.1, slide: 0.08 }, ..Settings::default() }).unwrap();
     let pose = Pose::new(DVec3::ZERO, DQuat::from_rotation_x(core::f64::consts::FRAC_PI_2));
     world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: cylinder, half_length: 0.01 }, pose)).unwrap();
     // Over the top, a gram at the short side and half a gram at the long one: more than friction holds.
     let r = cylinder + 1.05 * radius;
     let mut path = vec![DVec3::new(-r, 0.0, -0.03)];
-    path.extend((0..=60).map(|i| DQuat::from_rotation_y(core::f64::consts::PI * f64::from(i) / 60.0) * DVec3::NEG_X * r));
+    path.extend(
+        (0..=60).map(|i| DQuat::from_rotation_y(core::f64::consts::PI * f64::from(i) / 60.0) * DVec3::NEG_X * r),
+    );
     path.push(DVec3::new(r, 0.0, -0.01));
     let rod = world.insert_rod(&RodSpec::new(support::resample(&path, 80), radius, material)).unwrap();
     for (place, mass) in [(Place::Start, 5e-4), (Place::End, 1e-3)] {
@@ -160,7 +167,8 @@ fn knotted(newton_max: u32) -> (World, [Handle<sutura::Grip>; 2]) {
     let settings = Settings { substep: 1.0 / 240.0, newton_max, linear_damping: 0.9, angular_damping: 0.9, ..quiet() };
     let mut world = World::new(settings).unwrap();
     let rod = world.insert_rod(&RodSpec::new(overhand(length, 75), radius, material)).unwrap();
-    let pins = [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(rod, place, Hold::Pin)).unwrap());
+    let pins =
+        [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(rod, place, Hold::Pin)).unwrap());
     (world, pins)
 }
 
@@ -193,7 +201,9 @@ fn an_overhand_knot_whose_substeps_are_rejected_and_halved() {
 fn a_ring_with_a_branch_that_falls_onto_a_table() {
     let (material, radius) = t1();
     let mut world = World::new(Settings::default()).unwrap();
-    let ring = world.insert_rod(&RodSpec::ring(DVec3::Z * 2e-3, DVec3::Z, DVec3::X * 0.01, 40, radius, material.clone())).unwrap();
+    let ring = world
+        .insert_rod(&RodSpec::ring(DVec3::Z * 2e-3, DVec3::Z, DVec3::X * 0.01, 40, radius, material.clone()))
+        .unwrap();
     let at = world.rod(ring).unwrap().positions()[20];
     let branch = world.insert_rod(&RodSpec::straight(at, at - DVec3::X * 0.01, 10, radius, material)).unwrap();
     world.insert_weld(&WeldSpec::new(vec![(ring, Place::Particle(20)), (branch, Place::Start)])).unwrap();
@@ -203,8 +213,8 @@ fn a_ring_with_a_branch_that_falls_onto_a_table() {
     assert_eq!(second.allocations, 0, "{second:?}");
 }
 
-/// Up to the number of elements that there were before: feeding in and drawing back over the same length allocates nothing the second time. (Beyond it
-/// the arrays grow, as if a thread were inserted.)
+/// Up to the number of elements that there were before: feeding in and drawing back over the same length allocates
+/// nothing the second time. (Beyond it the arrays grow, as if a thread were inserted.)
 #[test]
 fn a_reel_within_the_elements_that_there_were() {
     let (material, radius) = t1();

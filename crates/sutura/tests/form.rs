@@ -1,5 +1,5 @@
-//! Flat or capsized: curves whose turning is known, a simulated square knot before and after it was spilled (the scene spilled_square),
-//! and what must not change an answer.
+//! Flat or capsized: curves whose turning is known, a simulated square knot before and after it was spilled (the scene
+//! spilled_square), and what must not change an answer.
 
 mod support;
 
@@ -27,11 +27,14 @@ fn of(points: &[DVec3], radius: f64) -> Option<Form> {
 
 /// A circular arc of this angle in a plane.
 fn arc(radius: f64, angle: f64) -> Vec<DVec3> {
-    (0..=400).map(|i| f64::from(i) / 400.0 * angle).map(|a| DVec3::new(radius * a.cos(), radius * a.sin(), 0.0)).collect()
+    (0..=400)
+        .map(|i| f64::from(i) / 400.0 * angle)
+        .map(|a| DVec3::new(radius * a.cos(), radius * a.sin(), 0.0))
+        .collect()
 }
 
-/// A straight strand along x, and one wound about it in contact: `turns` one way, then after a bend back, as in a lark's head, or not,
-/// as in two half hitches, as many again. Thread of radius 1.
+/// A straight strand along x, and one wound about it in contact: `turns` one way, then after a bend back, as in a
+/// lark's head, or not, as in two half hitches, as many again. Thread of radius 1.
 fn hitches(pitch: f64, turns: f64, larks_head: bool) -> [Vec<DVec3>; 2] {
     let helix = |sign: f64, shift: f64| {
         let n = 200;
@@ -52,8 +55,12 @@ fn the_share_is_that_of_the_angles_turned_through() {
     for (a, b) in [(PI, PI), (PI, FRAC_PI_2), (0.4, TAU), (TAU, 0.9 * TAU)] {
         for radius in [3.0, 10.0] {
             let f = form_of_strands([&arc(radius, a), &arc(2.0 * radius, b)], 1.0).unwrap();
-            // The polygon leaves out half a piece at each end, and a piece has one radius, rounded to a whole number of pieces: 1.5 at most.
-            assert!((f.turning[0] - a).abs() < 1.5 / radius && (f.turning[1] - b).abs() < 0.75 / radius, "{a} {b} {radius}: {f:?}");
+            // The polygon leaves out half a piece at each end, and a piece has one radius, rounded to a whole number of
+            // pieces: 1.5 at most.
+            assert!(
+                (f.turning[0] - a).abs() < 1.5 / radius && (f.turning[1] - b).abs() < 0.75 / radius,
+                "{a} {b} {radius}: {f:?}"
+            );
             assert!((f.share - 2.0 * f.turning[0].min(f.turning[1]) / (f.turning[0] + f.turning[1])).abs() < 1e-15);
             assert!((f.share - 2.0 * a.min(b) / (a + b)).abs() < 0.25, "{a} {b} {radius}: {f:?}");
         }
@@ -67,7 +74,11 @@ fn half_hitches_and_larks_heads_on_a_straight_strand_have_capsized() {
             for turns in [1.0, 1.5, 2.0] {
                 let [straight, wound] = hitches(pitch, turns, larks_head);
                 let f = form_of_strands([&straight, &wound], 1.0).unwrap();
-                assert_eq!((f.verdict, f.share), (Verdict::Capsized { straight: 0 }, 0.0), "{larks_head} {pitch} {turns}: {f:?}");
+                assert_eq!(
+                    (f.verdict, f.share),
+                    (Verdict::Capsized { straight: 0 }, 0.0),
+                    "{larks_head} {pitch} {turns}: {f:?}"
+                );
                 let exchanged = form_of_strands([&wound, &straight], 1.0).unwrap();
                 assert_eq!((exchanged.verdict, exchanged.share), (Verdict::Capsized { straight: 1 }, 0.0));
                 // A bow of 30 degrees, as under a load, is still straight enough.
@@ -91,7 +102,8 @@ fn of_two_threads_the_tails_do_not_count() {
     let f = form_of_two(&long, &tails, 1.0).unwrap();
     assert_eq!(f.verdict, Verdict::Capsized { straight: 0 });
     assert!(f.share < 0.02 && (f.turning[1] / within.turning[1] - 1.0).abs() < 0.15, "{f:?} {within:?}");
-    let two_bights = form_of_two(&arc(3.0, PI), &arc(3.0, PI).iter().map(|p| *p + DVec3::Z * 2.0).collect::<Vec<_>>(), 1.0).unwrap();
+    let two_bights =
+        form_of_two(&arc(3.0, PI), &arc(3.0, PI).iter().map(|p| *p + DVec3::Z * 2.0).collect::<Vec<_>>(), 1.0).unwrap();
     assert_eq!(two_bights.verdict, Verdict::Flat);
     assert!(two_bights.share > 0.99);
 }
@@ -129,10 +141,12 @@ fn a_thread_in_more_or_fewer_pieces_has_the_same_form() {
 fn a_thread_read_backward_changes_the_names_of_its_strands() {
     for name in ["tied_square", "spilled_square"] {
         let points = read(name);
-        let (f, b) = (of(&points, RADIUS).unwrap(), of(&points.iter().rev().copied().collect::<Vec<_>>(), RADIUS).unwrap());
+        let (f, b) =
+            (of(&points, RADIUS).unwrap(), of(&points.iter().rev().copied().collect::<Vec<_>>(), RADIUS).unwrap());
         assert!((f.share - b.share).abs() < 0.02, "{f:?} {b:?}");
         match (f.verdict, b.verdict) {
-            (Verdict::Capsized { straight: 0 }, Verdict::Capsized { straight: 1 }) | (Verdict::Flat, Verdict::Flat) => {}
+            (Verdict::Capsized { straight: 0 }, Verdict::Capsized { straight: 1 }) | (Verdict::Flat, Verdict::Flat) => {
+            }
             other => panic!("{other:?}"),
         }
     }
@@ -175,7 +189,9 @@ fn the_mean_tension_of_a_hanging_thread_is_that_at_the_middle_of_the_part() {
     let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::Z * -length, 20, radius, material)).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
     let force = DVec3::Z * -mass * 9.81;
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } })
+        .unwrap();
     support::settle(&mut world, 1.0 / 60.0, 1e-7, 20.0);
     let view = world.rod(rod).unwrap();
     let weight = 1150.0 * PI * radius * radius * 9.81;

@@ -4,11 +4,15 @@ mod support;
 
 use support::t1;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{ContactWith, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, Shape, ShapeSpec, World};
+use sutura::{
+    ContactWith, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, Shape,
+    ShapeSpec, World,
+};
 
 const G: f64 = 9.81;
 const DT: f64 = 1.0 / 60.0;
-/// Distance from a surface at which a thread lies, over its radius: contacts keep a fiftieth of the diameter in reserve.
+/// Distance from a surface at which a thread lies, over its radius: contacts keep a fiftieth of the diameter in
+/// reserve.
 const LIES_AT: f64 = 1.04;
 
 /// Unit vectors down a slope about the y axis and out of it.
@@ -25,8 +29,8 @@ fn settings(elsewhere: f64) -> Settings {
 /// Holds whatever lies on it.
 const ROUGH: Friction = Friction { stick: 9.0, slide: 9.0 };
 
-/// Lets things come to rest on rough surfaces, then sets the friction of the pair: it starts from forces that differ from contact to
-/// contact, some beyond the limit then.
+/// Lets things come to rest on rough surfaces, then sets the friction of the pair: it starts from forces that differ
+/// from contact to contact, some beyond the limit then.
 fn rest(world: &mut World, pair: (u32, u32), friction: Friction) {
     world.set_friction(pair.0, pair.1, ROUGH).unwrap();
     for _ in 0..30 {
@@ -58,7 +62,9 @@ impl Incline {
         let pose = Pose::new(DVec3::ZERO, DQuat::from_rotation_y(angle));
         let plane = world.insert_shape(&ShapeSpec { surface: 7, ..ShapeSpec::fixed(Geometry::Plane, pose) }).unwrap();
         let from = out * (LIES_AT * radius);
-        let rod = world.insert_rod(&RodSpec { surface: 4, ..RodSpec::straight(from, from + down * 0.01, 5, radius, material) }).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec { surface: 4, ..RodSpec::straight(from, from + down * 0.01, 5, radius, material) })
+            .unwrap();
         let weight = world.rod(rod).unwrap().rest_length() * 8.128_87e-5 * G;
         rest(&mut world, (7, 4), friction);
         Incline { world, rod, plane, down, out, radius, weight }
@@ -110,7 +116,10 @@ fn a_thread_on_a_plane_holds_for_a_minute_just_under_the_limit() {
         assert!(farthest < 1e-5, "mu {mu}: crept {farthest:e} m");
         let (count, normal, up) = it.carried();
         // Balance of the whole thread at rest: forces of the contacts against its weight.
-        assert!(count == 6 && (normal / angle.cos() - 1.0).abs() < 1e-3 && (up / angle.sin() - 1.0).abs() < 1e-3, "{count} {normal} {up}");
+        assert!(
+            count == 6 && (normal / angle.cos() - 1.0).abs() < 1e-3 && (up / angle.sin() - 1.0).abs() < 1e-3,
+            "{count} {normal} {up}"
+        );
     }
 }
 
@@ -123,7 +132,9 @@ fn a_thread_put_down_on_a_plane_holds_from_the_first_substep() {
         let angle = f64::atan(part * mu);
         let (down, out) = slope(angle);
         let mut world = World::new(settings(mu)).unwrap();
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::new(DVec3::ZERO, DQuat::from_rotation_y(angle)))).unwrap();
+        world
+            .insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::new(DVec3::ZERO, DQuat::from_rotation_y(angle))))
+            .unwrap();
         let from = out * (LIES_AT * radius);
         let rod = world.insert_rod(&RodSpec::straight(from, from + down * 0.01, 5, radius, material.clone())).unwrap();
         for _ in 0..60 {
@@ -149,7 +160,10 @@ fn a_thread_on_a_plane_slides_just_over_the_limit_and_stays_on_it() {
             it.step();
             lift = lift.max(it.lift());
             let (count, normal, _) = it.carried();
-            assert!(count == 6 && (normal / angle.cos() - 1.0).abs() < 0.01, "mu {mu}: {count} contacts carry {normal} of the weight");
+            assert!(
+                count == 6 && (normal / angle.cos() - 1.0).abs() < 0.01,
+                "mu {mu}: {count} contacts carry {normal} of the weight"
+            );
         }
         let got = (it.middle().1 - before) / (48.0 * DT);
         assert!((got / want - 1.0).abs() < 0.02, "mu {mu}: accelerates by {got}, wanted {want}");
@@ -199,7 +213,8 @@ impl Frame {
         world.set_friction(3, 3, ROUGH).unwrap();
         for y in [-2e-3, 2e-3] {
             let from = DVec3::Y * y;
-            let rail = RodSpec { surface: 3, ..RodSpec::straight(from, from + down * 0.015, 10, radius, material.clone()) };
+            let rail =
+                RodSpec { surface: 3, ..RodSpec::straight(from, from + down * 0.015, 10, radius, material.clone()) };
             let rail = world.insert_rod(&rail).unwrap();
             for place in [Place::Start, Place::End] {
                 let grip = world.insert_grip(&GripSpec::at_once(rail, place, Hold::Clamp)).unwrap();
@@ -284,7 +299,11 @@ fn a_thread_across_threads_slides_just_over_the_limit_and_stays_on_them() {
         assert!((got / want - 1.0).abs() < 0.02, "mu {mu}: accelerates by {got}, wanted {want}");
         // The reserve is a fiftieth of a diameter; a hundredth of it more would be lift.
         assert!(nearest > -0.01 && apart < 0.03, "mu {mu}: clearance from {nearest} to {apart} diameters");
-        assert!((normal / f64::from(steps) / angle.cos() - 1.0).abs() < 0.02, "mu {mu}: carries {} of the weight", normal / f64::from(steps));
+        assert!(
+            (normal / f64::from(steps) / angle.cos() - 1.0).abs() < 0.02,
+            "mu {mu}: carries {} of the weight",
+            normal / f64::from(steps)
+        );
     }
 }
 
@@ -324,7 +343,10 @@ fn the_pair_of_surfaces_decides() {
     for (a, b) in [(1, 2), (2, 1)] {
         let mut world = World::new(settings(0.3)).unwrap();
         world.set_friction(1, 9, ROUGH).unwrap();
-        let plane = ShapeSpec { surface: 9, ..ShapeSpec::fixed(Geometry::Plane, Pose::new(DVec3::ZERO, DQuat::from_rotation_y(angle))) };
+        let plane = ShapeSpec {
+            surface: 9,
+            ..ShapeSpec::fixed(Geometry::Plane, Pose::new(DVec3::ZERO, DQuat::from_rotation_y(angle)))
+        };
         world.insert_shape(&plane).unwrap();
         let rods = [(a, -5e-3), (b, 5e-3)].map(|(surface, y)| {
             let from = out * (LIES_AT * radius) + DVec3::Y * y;
@@ -339,7 +361,10 @@ fn the_pair_of_surfaces_decides() {
         for (surface, from, rod) in rods {
             let came = (world.rod(rod).unwrap().positions()[0] - from).dot(down);
             // With 0.1 it accelerates by 1.88 m/s^2: 23 cm in half a second.
-            assert!(if surface == 1 { came.abs() < 1e-5 } else { (0.2..0.26).contains(&came) }, "surface {surface} came {came} m");
+            assert!(
+                if surface == 1 { came.abs() < 1e-5 } else { (0.2..0.26).contains(&came) },
+                "surface {surface} came {came} m"
+            );
         }
     }
 }

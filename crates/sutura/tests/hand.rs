@@ -4,7 +4,10 @@ mod support;
 
 use support::t1;
 use sutura::glam::DVec3;
-use sutura::{Drive, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, World};
+use sutura::{
+    Drive, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeMotion,
+    ShapeSpec, World,
+};
 
 const DT: f64 = 1.0 / 60.0;
 const HOLDS: [Hold; 3] = [Hold::Pin, Hold::Clamp, Hold::Jaw];
@@ -15,7 +18,12 @@ fn led(hold: Hold, direction: DVec3, force: f64, speed_limit: f64) -> (World, Ha
     let mut world = World::new(Settings { gravity: DVec3::ZERO, ..Settings::default() }).unwrap();
     let material = Material { bend_damping: 0.01, ..material };
     let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.06, 30, radius, material)).unwrap();
-    let hand = world.insert_grip(&GripSpec { drive: Drive::Hand { direction, force, speed_limit }, ..GripSpec::at_once(rod, Place::End, hold) }).unwrap();
+    let hand = world
+        .insert_grip(&GripSpec {
+            drive: Drive::Hand { direction, force, speed_limit },
+            ..GripSpec::at_once(rod, Place::End, hold)
+        })
+        .unwrap();
     (world, rod, hand)
 }
 
@@ -26,7 +34,8 @@ fn steps(world: &mut World, n: u32) {
     }
 }
 
-/// A jump is a distance of 100 m/s in a step, from where it is to where it was to be led: what a force has taken farther than that was led nowhere.
+/// A jump is a distance of 100 m/s in a step, from where it is to where it was to be led: what a force has taken
+/// farther than that was led nowhere.
 #[test]
 fn what_a_force_takes_far_has_not_jumped() {
     let (mut world, _, hand) = led(Hold::Pin, DVec3::X, 1.0, 2.0);

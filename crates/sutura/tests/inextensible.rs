@@ -1,4 +1,5 @@
-//! Inextensible threads: under loads, and between things that do not give way, held longer, shorter or just as long as they are.
+//! Inextensible threads: under loads, and between things that do not give way, held longer, shorter or just as long as
+//! they are.
 
 mod support;
 
@@ -6,8 +7,8 @@ use core::f64::consts::PI;
 use support::t1;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Integrator, LoadKind, LoadSpec, Material, Place, Pose, Rod, RodSpec, Settings,
-    ShapeSpec, StepReport, Stretch, World,
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Integrator, LoadKind, LoadSpec, Material,
+    Place, Pose, Rod, RodSpec, Settings, ShapeSpec, StepReport, Stretch, World,
 };
 
 /// A frame [s].
@@ -43,7 +44,9 @@ impl Held {
         let (material, radius) = soft();
         let ea = material.young_modulus * PI * radius * radius;
         let mut world = World::new(settings).unwrap();
-        let rod = world.insert_rod(&RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, along * LENGTH, 48, radius, material) }).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, along * LENGTH, 48, radius, material) })
+            .unwrap();
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, hold)).unwrap();
         let end = world.insert_grip(&GripSpec::at_once(rod, Place::End, hold)).unwrap();
         Held { world, rod, end, along, ea }
@@ -57,7 +60,11 @@ impl Held {
         self.world.set_grip_pose(self.end, Pose::new(pose.position + self.along * by, pose.orientation)).unwrap();
         let report = self.world.step(DT);
         assert!(report.newton_iterations < MOST_ITERATIONS, "{report:?}");
-        assert!(report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })), "{:?}", report.incidents);
+        assert!(
+            report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })),
+            "{:?}",
+            report.incidents
+        );
         report
     }
     /// Force of the end on the thread, along it [N].
@@ -78,7 +85,8 @@ fn drawn_beyond_its_length_it_pulls_back_as_its_material_does_and_is_itself_agai
     for integrator in INTEGRATORS {
         for hold in [Hold::Pin, Hold::Clamp, Hold::Jaw] {
             for along in [DVec3::X, DVec3::new(0.48, -0.6, 0.64)] {
-                let mut held = Held::new(Settings { integrator, ..Settings::default() }, hold, along, Stretch::Inextensible);
+                let mut held =
+                    Held::new(Settings { integrator, ..Settings::default() }, hold, along, Stretch::Inextensible);
                 let what = format!("{integrator:?} {hold:?} {along}");
                 // First slack, then drawn to 3 % beyond, held, and slack again.
                 (0..30).for_each(|_| drop(held.draw(-1e-4)));
@@ -93,10 +101,17 @@ fn drawn_beyond_its_length_it_pulls_back_as_its_material_does_and_is_itself_agai
                 let length = if hold == Hold::Jaw { LENGTH * 46.0 / 48.0 } else { LENGTH };
                 close(held.force() - taut, held.ea * 20.0 * 1.01e-4 / length, 5e-3, &what);
                 close(held.force(), held.ea * 4.07e-3 / length, 0.03, &what);
-                assert!(matches!(report.incidents[..], [ref i] if matches!(i.kind, IncidentKind::LengthNotKept { rod, .. } if rod == held.rod)), "{what}");
+                assert!(
+                    matches!(report.incidents[..], [ref i] if matches!(i.kind, IncidentKind::LengthNotKept { rod, .. } if rod == held.rod)),
+                    "{what}"
+                );
                 (0..70).for_each(|_| drop(held.draw(-1.01e-4)));
                 let report = held.draw(0.0);
-                assert!(report.incidents.is_empty() && held.elongation() < 5e-6, "{what}: {:e} {report:?}", held.elongation());
+                assert!(
+                    report.incidents.is_empty() && held.elongation() < 5e-6,
+                    "{what}: {:e} {report:?}",
+                    held.elongation()
+                );
                 assert!(held.force().abs() < 0.01, "{what}: slack it pulls with {}", held.force());
             }
         }
@@ -125,7 +140,12 @@ fn held_at_its_length_its_tension_stays_what_it_was() {
 #[test]
 fn drawn_slowly_it_carries_no_more_than_half_of_its_stiffness_and_then_pulls_as_its_material_does() {
     for integrator in INTEGRATORS {
-        let mut held = Held::new(Settings { gravity: DVec3::ZERO, integrator, ..Settings::default() }, Hold::Pin, DVec3::X, Stretch::Inextensible);
+        let mut held = Held::new(
+            Settings { gravity: DVec3::ZERO, integrator, ..Settings::default() },
+            Hold::Pin,
+            DVec3::X,
+            Stretch::Inextensible,
+        );
         let mut most = 0.0_f64;
         for _ in 0..40 {
             held.draw(5e-7 * LENGTH);
@@ -139,15 +159,26 @@ fn drawn_slowly_it_carries_no_more_than_half_of_its_stiffness_and_then_pulls_as_
         close(held.force(), before, 1e-6, "held");
         (0..4).for_each(|_| drop(held.draw(-5e-6 * LENGTH)));
         let report = held.draw(0.0);
-        assert!(report.incidents.is_empty() && held.elongation() < 5e-6 && held.force().abs() < 1e-3, "{integrator:?}: {} {report:?}", held.force());
+        assert!(
+            report.incidents.is_empty() && held.elongation() < 5e-6 && held.force().abs() < 1e-3,
+            "{integrator:?}: {} {report:?}",
+            held.force()
+        );
     }
 }
 
 #[test]
 fn drawn_by_a_force_and_then_held_it_keeps_its_tension_and_gains_what_it_is_stretched_by() {
     for integrator in INTEGRATORS {
-        let mut held = Held::new(Settings { gravity: DVec3::ZERO, integrator, ..Settings::default() }, Hold::Pin, DVec3::X, Stretch::Inextensible);
-        held.world.set_grip_drive(held.end, Drive::Force { direction: DVec3::X, force: 2.0, speed_limit: 0.05 }).unwrap();
+        let mut held = Held::new(
+            Settings { gravity: DVec3::ZERO, integrator, ..Settings::default() },
+            Hold::Pin,
+            DVec3::X,
+            Stretch::Inextensible,
+        );
+        held.world
+            .set_grip_drive(held.end, Drive::Force { direction: DVec3::X, force: 2.0, speed_limit: 0.05 })
+            .unwrap();
         for _ in 0..60 {
             assert!(held.world.step(DT).incidents.is_empty());
         }
@@ -159,7 +190,12 @@ fn drawn_by_a_force_and_then_held_it_keeps_its_tension_and_gains_what_it_is_stre
         (0..12).for_each(|_| drop(held.draw(-1e-5)));
         close(held.force(), 2.0, 1e-3, "and back");
         held.draw(-2e-5);
-        close(held.force(), -held.ea * 2e-5 / LENGTH, 1e-3, "shorter than it is it has no tension, and is pressed along itself");
+        close(
+            held.force(),
+            -held.ea * 2e-5 / LENGTH,
+            1e-3,
+            "shorter than it is it has no tension, and is pressed along itself",
+        );
     }
 }
 
@@ -187,7 +223,8 @@ fn shifted(held: &Held, by: f64) -> Pose {
     Pose::new(pose.position + held.along * by, pose.orientation)
 }
 
-/// Force of the end of a thread around a post, whose other end is held, while the end is drawn by 3 mm and let back by 4.
+/// Force of the end of a thread around a post, whose other end is held, while the end is drawn by 3 mm and let back by
+/// 4.
 fn around_a_post(stretch: Stretch, integrator: Integrator) -> Vec<f64> {
     let (material, radius) = soft();
     let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
@@ -197,7 +234,9 @@ fn around_a_post(stretch: Stretch, integrator: Integrator) -> Vec<f64> {
     let length = 2.0 * arm + around * PI;
     let at = |s: f64| match s {
         s if s < arm => DVec3::new(-around, 0.0, s - arm),
-        s if s < arm + around * PI => DVec3::new(-around * ((s - arm) / around).cos(), 0.0, around * ((s - arm) / around).sin()),
+        s if s < arm + around * PI => {
+            DVec3::new(-around * ((s - arm) / around).cos(), 0.0, around * ((s - arm) / around).sin())
+        }
         s => DVec3::new(around, 0.0, arm + around * PI - s),
     };
     let points = (0..=80).map(|i| at(length * f64::from(i) / 80.0)).collect();
@@ -225,7 +264,8 @@ fn around_a_post(stretch: Stretch, integrator: Integrator) -> Vec<f64> {
 #[test]
 fn taut_around_a_post_it_pulls_as_its_material_does() {
     for integrator in INTEGRATORS {
-        let (got, want) = (around_a_post(Stretch::Inextensible, integrator), around_a_post(Stretch::Elastic, integrator));
+        let (got, want) =
+            (around_a_post(Stretch::Inextensible, integrator), around_a_post(Stretch::Elastic, integrator));
         // Frictional contacts of the second order part a little where one substep goes another way.
         let bar = if integrator == Integrator::ImplicitEuler { 1e-4 } else { 0.01 };
         for f in (5..100).step_by(5) {
@@ -252,7 +292,8 @@ fn the_same_input_gives_the_same_bits_with_and_without_working_memory() {
     assert_eq!(hashes(false), hashes(true));
 }
 
-/// A thread of 150 mm of 0.45 mm nylon held at its start, straight at an angle from where it hangs, with a load at its end.
+/// A thread of 150 mm of 0.45 mm nylon held at its start, straight at an angle from where it hangs, with a load at its
+/// end.
 struct Hung {
     world: World,
     rod: Handle<Rod>,
@@ -288,7 +329,8 @@ fn mass_at_end(mass: f64) -> LoadKind {
 
 #[test]
 fn a_heavy_end_swings_as_a_pendulum_does() {
-    // Where it is clamped an element bends within its own length and is sheared by a tenth, which must not count as length.
+    // Where it is clamped an element bends within its own length and is sheared by a tenth, which must not count as
+    // length.
     for integrator in INTEGRATORS {
         for (mass, elements, hold) in [
             (0.05, 120, Hold::Clamp),
@@ -301,7 +343,8 @@ fn a_heavy_end_swings_as_a_pendulum_does() {
             (10.0, 120, Hold::Clamp),
         ] {
             let what = format!("{integrator:?} {mass} kg {elements} {hold:?}");
-            let mut hung = Hung::new(Settings { integrator, ..Settings::default() }, elements, hold, PI / 4.0, mass_at_end(mass));
+            let mut hung =
+                Hung::new(Settings { integrator, ..Settings::default() }, elements, hold, PI / 4.0, mass_at_end(mass));
             let mut most = 0.0_f64;
             for f in 0..60 {
                 hung.step(&what);
@@ -314,11 +357,13 @@ fn a_heavy_end_swings_as_a_pendulum_does() {
                 // Weight and turning on the line; the thread itself weighs 27 mg.
                 let want = mass * (9.81 * -line.z + (v - line * v.dot(line)).length_squared() / HUNG);
                 let got = -hung.force().dot(line);
-                // The thread itself swings too as it is let go. The velocity of implicit Euler is that of the middle of the substep, in which the line turns
-                // by up to 0.033 rad. A clamped thread bends
-                // over sqrt(EI / T), 4 mm with 50 g where it turns round: from there on it is a pendulum, and its clamp bears a moment.
+                // The thread itself swings too as it is let go. The velocity of implicit Euler is that of the middle of
+                // the substep, in which the line turns by up to 0.033 rad. A clamped thread bends
+                // over sqrt(EI / T), 4 mm with 50 g where it turns round: from there on it is a pendulum, and its clamp
+                // bears a moment.
                 let bent = (2.2e9 * 0.25 * PI * 0.225e-3_f64.powi(4) / (9.81 * mass * (PI / 4.0).cos())).sqrt() / HUNG;
-                let bar = if integrator == Integrator::TrBdf2 { 0.01 } else { 0.033 } + if hold == Hold::Clamp { 2.0 * bent } else { 0.0 };
+                let bar = if integrator == Integrator::TrBdf2 { 0.01 } else { 0.033 }
+                    + if hold == Hold::Clamp { 2.0 * bent } else { 0.0 };
                 assert!((got - want).abs() < bar * mass * 9.81, "{what} frame {f}: {got}, not {want}");
                 most = most.max(hung.force().length());
             }
@@ -342,7 +387,13 @@ fn what_hangs_at_rest_is_held_at_its_length() {
                 ] {
                     let what = format!("{integrator:?} {elements} {hold:?} {kind:?}");
                     let load = if let LoadKind::Mass { mass, .. } = kind { 9.81 * mass } else { 9.81 };
-                    let mut hung = Hung::new(Settings { integrator, linear_damping: 0.9, ..Settings::default() }, elements, hold, 0.0, kind);
+                    let mut hung = Hung::new(
+                        Settings { integrator, linear_damping: 0.9, ..Settings::default() },
+                        elements,
+                        hold,
+                        0.0,
+                        kind,
+                    );
                     (0..20).for_each(|_| hung.step(&what));
                     // With the weight of the thread itself.
                     let weight = 9.81 * 1140.0 * PI * 0.225e-3 * 0.225e-3 * HUNG;
@@ -359,7 +410,11 @@ fn a_jolt_that_no_thread_bears_stretches_it_and_after_it_has_its_length() {
     let (mut told, mut most) = (0, 0.0_f64);
     for _ in 0..240 {
         let report = hung.world.step(DT);
-        assert!(report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })), "{:?}", report.incidents);
+        assert!(
+            report.incidents.iter().all(|i| matches!(i.kind, IncidentKind::LengthNotKept { .. })),
+            "{:?}",
+            report.incidents
+        );
         told += report.incidents.len();
         most = most.max(hung.force().length());
     }

@@ -5,8 +5,8 @@ mod support;
 use support::{quiet, settle, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, RestShape, Rod, RodSpec, Settings, ShapeSpec, Stretch,
-    World,
+    Friction, Geometry, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, Place, Pose, RestShape, Rod,
+    RodSpec, Settings, ShapeSpec, Stretch, World,
 };
 
 /// Newton so far that its error is far below that of time.
@@ -47,7 +47,9 @@ fn pendulum(settings: Settings) -> Vec<DVec3> {
     let (material, radius) = t1();
     let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 1, radius, material)).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 1e-5, inertia: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 1e-5, inertia: DVec3::ZERO } })
+        .unwrap();
     run(&mut world, 0.25);
     seen(&world, rod)
 }
@@ -56,7 +58,10 @@ fn pendulum(settings: Settings) -> Vec<DVec3> {
 fn a_pendulum_is_of_second_order() {
     let p = order(|h| pendulum(Settings { gravity: WEIGHT, ..second_order(h) }), 1.0 / 480.0);
     assert!(p > 1.8, "order {p}");
-    let first = order(|h| pendulum(Settings { gravity: WEIGHT, integrator: Integrator::ImplicitEuler, ..second_order(h) }), 1.0 / 480.0);
+    let first = order(
+        |h| pendulum(Settings { gravity: WEIGHT, integrator: Integrator::ImplicitEuler, ..second_order(h) }),
+        1.0 / 480.0,
+    );
     assert!(first < 1.3, "implicit Euler has order {first}");
 }
 
@@ -77,7 +82,12 @@ fn a_clamped_thread_with_bend_damping_is_of_second_order() {
         let start = world.grip_pose(grip).unwrap();
         for frame in 1..=10 {
             // At a constant rate from the start, so that the drive has no kinks that refinement would see.
-            world.set_grip_pose(grip, Pose::new(start.position, DQuat::from_rotation_y(0.1 * f64::from(frame)) * start.orientation)).unwrap();
+            world
+                .set_grip_pose(
+                    grip,
+                    Pose::new(start.position, DQuat::from_rotation_y(0.1 * f64::from(frame)) * start.orientation),
+                )
+                .unwrap();
             let report = world.step(0.01);
             assert!(report.converged && report.rejected == 0, "{report:?}");
         }
@@ -90,10 +100,26 @@ fn a_clamped_thread_with_bend_damping_is_of_second_order() {
 /// A free rod with uneven moments of inertia at its end, pushed and turned for a while and then left to tumble.
 fn tumbling(settings: Settings, bend_damping: f64) -> (World, Handle<Rod>) {
     let mut world = World::new(settings).unwrap();
-    let rod =
-        world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.03, 10, 0.5e-3, Material { bend_damping, ..Material::elastic(1e7, 1000.0) })).unwrap();
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 1e-5, inertia: DVec3::new(1e-10, 3e-10, 2e-10) } }).unwrap();
-    let push = |part: f64| LoadKind::Point { place: Place::Start, force: DVec3::new(0.0, 2e-4, 0.6e-4) * part, torque: DVec3::new(2e-8, 0.0, 0.0) * part };
+    let rod = world
+        .insert_rod(&RodSpec::straight(
+            DVec3::ZERO,
+            DVec3::X * 0.03,
+            10,
+            0.5e-3,
+            Material { bend_damping, ..Material::elastic(1e7, 1000.0) },
+        ))
+        .unwrap();
+    world
+        .insert_load(&LoadSpec {
+            rod,
+            kind: LoadKind::Mass { place: Place::End, mass: 1e-5, inertia: DVec3::new(1e-10, 3e-10, 2e-10) },
+        })
+        .unwrap();
+    let push = |part: f64| LoadKind::Point {
+        place: Place::Start,
+        force: DVec3::new(0.0, 2e-4, 0.6e-4) * part,
+        torque: DVec3::new(2e-8, 0.0, 0.0) * part,
+    };
     let load = world.insert_load(&LoadSpec { rod, kind: push(0.0) }).unwrap();
     // Softly: what a jump would set ringing is not resolved in time. Each change of the load is a restart.
     for k in 0..50 {
@@ -126,7 +152,8 @@ fn a_free_rod_that_tumbles_is_of_second_order() {
 fn momentum_stays_and_energy_does_not_grow() {
     let (mut world, rod) = tumbling(second_order(1.0 / 400.0), 0.0);
     let momentum = world.rod(rod).unwrap().momentum();
-    // Where it restarts a velocity is off by a third of the substep times an acceleration that comes of its constraints; for 20 substeps that may ring.
+    // Where it restarts a velocity is off by a third of the substep times an acceleration that comes of its
+    // constraints; for 20 substeps that may ring.
     world.step(0.05);
     let mut least = world.rod(rod).unwrap().energy().total();
     let first = least;
@@ -159,7 +186,14 @@ fn drag_takes_the_same_in_a_second() {
 #[test]
 fn rest_does_not_depend_on_it() {
     let tip = |integrator: Integrator| {
-        let settings = Settings { gravity: WEIGHT, integrator, linear_damping: 1.0 - 1e-9, tolerance: 1e-12, newton_max: 40, ..quiet() };
+        let settings = Settings {
+            gravity: WEIGHT,
+            integrator,
+            linear_damping: 1.0 - 1e-9,
+            tolerance: 1e-12,
+            newton_max: 40,
+            ..quiet()
+        };
         let mut world = World::new(Settings { substep: 1.0 / 240.0, ..settings }).unwrap();
         let (material, radius) = t1();
         let material = Material { bend_damping: 0.01, ..material };
@@ -183,7 +217,8 @@ fn landing(settings: Settings, height: f64) -> (World, Handle<Rod>) {
     let (material, radius) = t1();
     let start = DVec3::new(-0.02, 0.0, radius + height);
     let rod = world.insert_rod(&RodSpec::straight(start, start + DVec3::X * 0.04, 10, radius, material)).unwrap();
-    let floor = ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::new(0.1, 0.1, 0.01) }, Pose::at(DVec3::NEG_Z * 0.01));
+    let floor =
+        ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::new(0.1, 0.1, 0.01) }, Pose::at(DVec3::NEG_Z * 0.01));
     world.insert_shape(&floor).unwrap();
     (world, rod)
 }
@@ -192,7 +227,12 @@ fn landing(settings: Settings, height: f64) -> (World, Handle<Rod>) {
 fn an_impact_gains_no_energy_and_comes_to_rest() {
     for k in 0..10 {
         // The moment of impact falls anywhere within a substep.
-        let settings = Settings { gravity: WEIGHT, friction: Friction::coulomb(0.3), tolerance: 1e-3, ..second_order(1.0 / 240.0) };
+        let settings = Settings {
+            gravity: WEIGHT,
+            friction: Friction::coulomb(0.3),
+            tolerance: 1e-3,
+            ..second_order(1.0 / 240.0)
+        };
         let (mut world, rod) = landing(settings, 2e-3 + 4e-5 * f64::from(k));
         let mut least = world.rod(rod).unwrap().energy().total();
         for frame in 0..60 {
@@ -235,7 +275,9 @@ fn halved_substeps_keep_the_answer() {
     let tip = |newton_max: u32, substep: f64| {
         let settings = Settings { gravity: WEIGHT, tolerance: 1e-6, newton_max, ..second_order(substep) };
         let mut world = World::new(settings).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, 0.25e-3, Material::elastic(1e7, 1000.0))).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, 0.25e-3, Material::elastic(1e7, 1000.0)))
+            .unwrap();
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
         let mut rejected = 0;
         for _ in 0..24 {
@@ -255,7 +297,9 @@ fn halved_substeps_keep_the_answer() {
 #[test]
 fn lengths_are_held_in_very_short_substeps() {
     // So short that multipliers do not settle in a solve.
-    let mut world = World::new(Settings { gravity: WEIGHT, tolerance: 1e-4, newton_max: 12, ..second_order(1.0 / 7680.0) }).unwrap();
+    let mut world =
+        World::new(Settings { gravity: WEIGHT, tolerance: 1e-4, newton_max: 12, ..second_order(1.0 / 7680.0) })
+            .unwrap();
     let thread = RodSpec::straight(DVec3::ZERO, DVec3::X * 0.15, 120, 0.25e-3, Material::elastic(1e7, 1000.0));
     let rod = world.insert_rod(&RodSpec { stretch: Stretch::Inextensible, ..thread }).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
@@ -268,16 +312,19 @@ fn lengths_are_held_in_very_short_substeps() {
     assert!((tip.z / (-0.5 * 9.81 * t * t) - 1.0).abs() < 0.02, "{tip}");
 }
 
-/// A thread of monofilament bent to an arc, straight at rest, let go: bending of all wavelengths, most of it far too quick for the substep.
+/// A thread of monofilament bent to an arc, straight at rest, let go: bending of all wavelengths, most of it far too
+/// quick for the substep.
 fn let_go(settings: Settings, stretch: Stretch) -> (World, Handle<Rod>) {
     let mut world = World::new(settings).unwrap();
-    let at = |i: u32| DVec3::new((0.06 * f64::from(i)).sin(), -(0.06 * f64::from(i)).cos(), 1e-3 * f64::from(i)) * 16.7e-3;
+    let at =
+        |i: u32| DVec3::new((0.06 * f64::from(i)).sin(), -(0.06 * f64::from(i)).cos(), 1e-3 * f64::from(i)) * 16.7e-3;
     let spec = RodSpec::new((0..=60).map(at).collect(), 0.16e-3, Material::elastic(2.2e9, 1140.0));
     let rod = world.insert_rod(&RodSpec { rest: RestShape::Straight, stretch, ..spec }).unwrap();
     (world, rod)
 }
 
-/// Angular momentum about the center of mass, and the moment of inertia about axes across, of a round thread of one density.
+/// Angular momentum about the center of mass, and the moment of inertia about axes across, of a round thread of one
+/// density.
 fn turning(world: &World, rod: Handle<Rod>, density: f64) -> (DVec3, f64) {
     let view = world.rod(rod).unwrap();
     let (x, v, n) = (view.positions(), view.velocities(), view.n_elements());
@@ -301,7 +348,10 @@ fn a_bent_thread_let_go_never_gains() {
                     world.step(1.0 / 60.0);
                     let energy = world.rod(rod).unwrap().energy().total();
                     // Rounding of the energies that a gain is the difference of.
-                    assert!(energy <= least + 1e-12 * first, "{integrator:?} {stretch:?} {substep} frame {frame}: {energy:e} after {least:e} of {first:e}");
+                    assert!(
+                        energy <= least + 1e-12 * first,
+                        "{integrator:?} {stretch:?} {substep} frame {frame}: {energy:e} after {least:e} of {first:e}"
+                    );
                     least = energy;
                     // It began at rest. Momentum of the whole at the speed that all of its energy would give it.
                     let (momentum, inertia) = turning(&world, rod, 1140.0);
@@ -317,10 +367,20 @@ fn a_bent_thread_let_go_never_gains() {
 fn what_is_spun_keeps_its_spin_when_let_go() {
     let (rate, frame) = (8.0, 1.0 / 60.0);
     for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
-        for (hold, place) in [(Hold::Clamp, Place::Start), (Hold::Clamp, Place::Particle(10)), (Hold::Jaw, Place::Start)] {
+        for (hold, place) in
+            [(Hold::Clamp, Place::Start), (Hold::Clamp, Place::Particle(10)), (Hold::Jaw, Place::Start)]
+        {
             for axis in [DVec3::X, DVec3::Z] {
                 let mut world = World::new(Settings { integrator, substep: 1.0 / 240.0, ..quiet() }).unwrap();
-                let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.06, 20, 0.5e-3, Material::elastic(2.2e9, 1140.0))).unwrap();
+                let rod = world
+                    .insert_rod(&RodSpec::straight(
+                        DVec3::ZERO,
+                        DVec3::X * 0.06,
+                        20,
+                        0.5e-3,
+                        Material::elastic(2.2e9, 1140.0),
+                    ))
+                    .unwrap();
                 let grip = world.insert_grip(&GripSpec::at_once(rod, place, hold)).unwrap();
                 let start = world.grip_pose(grip).unwrap();
                 // Brought to its rate over half a second, so that nothing rings.
@@ -340,13 +400,32 @@ fn what_is_spun_keeps_its_spin_when_let_go() {
                 for k in 0..120 {
                     world.step(frame);
                     let now = seen(&world);
-                    // Of the rates a substep at 8 rad/s, a thirtieth of a radian, is off by the square of that; of second order the ends
-                    // still swing from being brought to speed. Momentum does not change at all.
+                    // Of the rates a substep at 8 rad/s, a thirtieth of a radian, is off by the square of that; of
+                    // second order the ends still swing from being brought to speed. Momentum does not change at all.
                     let allowed = if integrator == Integrator::TrBdf2 { 2e-2 } else { 2e-3 };
-                    assert!((now.1 - axis * rate).length() < allowed * rate, "{integrator:?} {hold:?} {axis} {k}: {} rad/s", now.1);
-                    assert!((now.0 - before.0).length() <= 1e-4 * before.0.length() + 1e-16, "{integrator:?} {hold:?} {axis} {k}: {} {}", before.0, now.0);
-                    assert!((now.2 - before.2).length() <= 1e-9 * before.2.length() + 1e-14, "{integrator:?} {hold:?} {axis} {k}: {} {}", before.2, now.2);
-                    assert!(now.3 <= before.3 * (1.0 + 1e-9) && now.3 > 0.99 * before.3, "{integrator:?} {hold:?} {axis} {k}: {:e} {:e}", before.3, now.3);
+                    assert!(
+                        (now.1 - axis * rate).length() < allowed * rate,
+                        "{integrator:?} {hold:?} {axis} {k}: {} rad/s",
+                        now.1
+                    );
+                    assert!(
+                        (now.0 - before.0).length() <= 1e-4 * before.0.length() + 1e-16,
+                        "{integrator:?} {hold:?} {axis} {k}: {} {}",
+                        before.0,
+                        now.0
+                    );
+                    assert!(
+                        (now.2 - before.2).length() <= 1e-9 * before.2.length() + 1e-14,
+                        "{integrator:?} {hold:?} {axis} {k}: {} {}",
+                        before.2,
+                        now.2
+                    );
+                    assert!(
+                        now.3 <= before.3 * (1.0 + 1e-9) && now.3 > 0.99 * before.3,
+                        "{integrator:?} {hold:?} {axis} {k}: {:e} {:e}",
+                        before.3,
+                        now.3
+                    );
                 }
             }
         }
@@ -357,13 +436,17 @@ fn what_is_spun_keeps_its_spin_when_let_go() {
 fn what_is_thrown_flies_on() {
     for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
         let mut world = World::new(Settings { gravity: WEIGHT, integrator, ..quiet() }).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.06, 20, 0.5e-3, Material::elastic(2.2e9, 1140.0))).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.06, 20, 0.5e-3, Material::elastic(2.2e9, 1140.0)))
+            .unwrap();
         let grip = world.insert_grip(&GripSpec::at_once(rod, Place::Particle(10), Hold::Clamp)).unwrap();
         let start = world.grip_pose(grip).unwrap();
         for k in 1..=60 {
             let t = f64::from(k) / 60.0;
             let along = if t < 0.5 { t * t } else { t - 0.25 };
-            world.set_grip_pose(grip, Pose::new(start.position + DVec3::new(0.3, 0.0, 0.4) * along, start.orientation)).unwrap();
+            world
+                .set_grip_pose(grip, Pose::new(start.position + DVec3::new(0.3, 0.0, 0.4) * along, start.orientation))
+                .unwrap();
             world.step(1.0 / 60.0);
         }
         world.remove_grip(grip).unwrap();
@@ -383,7 +466,9 @@ fn drag_of_any_size_is_exact_for_what_is_free() {
             for substep in [1.0 / 120.0, 1.0 / 960.0] {
                 let settings = Settings { gravity: DVec3::ZERO, integrator, substep, ..quiet() };
                 let mut world = World::new(Settings { gravity: DVec3::Y, ..settings.clone() }).unwrap();
-                let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 4, radius, material.clone())).unwrap();
+                let rod = world
+                    .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 4, radius, material.clone()))
+                    .unwrap();
                 world.step(0.5);
                 let before = world.rod(rod).unwrap().velocities()[2].y;
                 world.set_settings(Settings { linear_drag: drag, angular_drag: drag, ..settings.clone() }).unwrap();
@@ -392,14 +477,23 @@ fn drag_of_any_size_is_exact_for_what_is_free() {
                     // Implicit Euler's velocity is that of the way over a substep: it lags by one.
                     let after = world.rod(rod).unwrap().velocities()[2].y;
                     let left = (-drag * f64::from(k) / 120.0).exp();
-                    assert!((after / before - left).abs() < 1e-9 * left + 1e-15, "{integrator:?} {drag} {substep}: {} for {left}", after / before);
+                    assert!(
+                        (after / before - left).abs() < 1e-9 * left + 1e-15,
+                        "{integrator:?} {drag} {substep}: {} for {left}",
+                        after / before
+                    );
                 }
-                // What falls comes to the speed at which drag bears its weight. Of second order, where drag is split off: to (c h)^2 / 24.
+                // What falls comes to the speed at which drag bears its weight. Of second order, where drag is split
+                // off: to (c h)^2 / 24.
                 world.set_settings(Settings { gravity: WEIGHT, linear_drag: drag, ..settings }).unwrap();
                 world.step(if drag < 1.0 { 40.0 } else { 1.0 });
                 let (speed, x) = (-world.rod(rod).unwrap().velocities()[2].z, drag * substep);
                 let allowed = 1e-6 + if integrator == Integrator::TrBdf2 && x < 0.6 { x * x / 20.0 } else { 0.0 };
-                assert!((speed / (9.81 / drag) - 1.0).abs() < allowed, "{integrator:?} {drag} {substep}: {speed} for {}", 9.81 / drag);
+                assert!(
+                    (speed / (9.81 / drag) - 1.0).abs() < allowed,
+                    "{integrator:?} {drag} {substep}: {speed} for {}",
+                    9.81 / drag
+                );
             }
         }
     }
@@ -413,11 +507,20 @@ fn drag_of_any_size_is_exact_for_what_is_free() {
 fn drag_stops_a_swing_at_the_rate_that_was_asked() {
     // A bob on a thread swings at 9.9 rad/s and with a drag of 2 1/s keeps exp(-t) of its amplitude.
     for (integrator, allowed) in [(Integrator::ImplicitEuler, 0.1), (Integrator::TrBdf2, 0.03)] {
-        let mut world = World::new(Settings { gravity: WEIGHT, integrator, substep: 1.0 / 1920.0, linear_drag: 2.0, ..quiet() }).unwrap();
+        let mut world =
+            World::new(Settings { gravity: WEIGHT, integrator, substep: 1.0 / 1920.0, linear_drag: 2.0, ..quiet() })
+                .unwrap();
         let (material, radius) = t1();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::new(0.01, 0.0, -0.1), 1, radius, material.clone())).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::new(0.01, 0.0, -0.1), 1, radius, material.clone()))
+            .unwrap();
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
-        world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 1e-4, inertia: DVec3::ZERO } }).unwrap();
+        world
+            .insert_load(&LoadSpec {
+                rod,
+                kind: LoadKind::Mass { place: Place::End, mass: 1e-4, inertia: DVec3::ZERO },
+            })
+            .unwrap();
         world.step(2.0);
         let (length, t) = (0.01f64.hypot(0.1), 2.0f64);
         let damped = (9.81 / length - 1.0).sqrt();
@@ -441,5 +544,8 @@ fn drag_is_recorded_and_what_was_recorded_before_is_read() {
     assert_eq!(plain.len() + 17, bytes.len());
     let mut old = plain;
     old[8] = 3;
-    assert_eq!(Recording::from_bytes(&old).unwrap().replay(&mut |_| core::ops::ControlFlow::Continue(())).unwrap().settings(), &quiet());
+    assert_eq!(
+        Recording::from_bytes(&old).unwrap().replay(&mut |_| core::ops::ControlFlow::Continue(())).unwrap().settings(),
+        &quiet()
+    );
 }

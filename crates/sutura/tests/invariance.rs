@@ -1,5 +1,5 @@
-//! What must not matter does not: static answers are the same for another substep, another iteration budget and other damping, and for
-//! the same thing turned, mirrored, numbered from the other end, or ten times as large.
+//! What must not matter does not: static answers are the same for another substep, another iteration budget and other
+//! damping, and for the same thing turned, mirrored, numbered from the other end, or ten times as large.
 
 mod support;
 
@@ -7,7 +7,8 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use support::{quiet, resample, settle, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Friction, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose, RestShape, Rod, RodSpec, Settings, ShapeSpec, Stretch, World,
+    Friction, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose, RestShape, Rod, RodSpec,
+    Settings, ShapeSpec, Stretch, World,
 };
 
 /// The way in which a case is done. The default is plain.
@@ -24,8 +25,8 @@ struct Way {
     mirror: bool,
     /// Particles numbered from the other end.
     reversed: bool,
-    /// Lengths and times times this, stresses and densities as they are: forces grow by its square, torques by its cube, gravity
-    /// falls by it.
+    /// Lengths and times times this, stresses and densities as they are: forces grow by its square, torques by its
+    /// cube, gravity falls by it.
     scale: f64,
 }
 
@@ -92,7 +93,14 @@ impl Way {
     }
 
     /// A thread of the T1 material through points given for the plain case.
-    fn thread(&self, world: &mut World, points: &[DVec3], bend_scale: f64, stretch: Stretch, rest: RestShape) -> Handle<Rod> {
+    fn thread(
+        &self,
+        world: &mut World,
+        points: &[DVec3],
+        bend_scale: f64,
+        stretch: Stretch,
+        rest: RestShape,
+    ) -> Handle<Rod> {
         let (material, radius) = t1();
         let material = Material { bend_scale, bend_damping: self.bend_damping * self.scale, ..material };
         let mut points: Vec<DVec3> = points.iter().map(|p| self.point(*p)).collect();
@@ -128,12 +136,21 @@ fn cantilever_under_tip_load(way: &Way) -> Answers {
     // P L^2 / EI = 3 down and 1 across.
     let unit = 7.952_16e-7 / (length * length);
     let force = way.force(DVec3::new(0.0, unit, -3.0 * unit));
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: way.place(Place::End), force, torque: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec {
+            rod,
+            kind: LoadKind::Point { place: way.place(Place::End), force, torque: DVec3::ZERO },
+        })
+        .unwrap();
     way.settle(&mut world);
     let tip = way.positions(&world, rod)[40];
     let root = world.grip_wrench(clamp).unwrap();
     let deflection = (tip - DVec3::X * length).length();
-    vec![("tip", tip, deflection), ("root force", way.force_back(root.force), 3.0 * unit), ("root moment", way.torque_back(root.torque), 3.0 * unit * length)]
+    vec![
+        ("tip", tip, deflection),
+        ("root force", way.force_back(root.force), 3.0 * unit),
+        ("root moment", way.torque_back(root.torque), 3.0 * unit * length),
+    ]
 }
 
 /// Cantilever of 100 mm under its own weight.
@@ -164,7 +181,8 @@ fn catenary(way: &Way) -> Answers {
         .collect();
     let points = resample(&fine, 40);
     let rod = way.thread(&mut world, &points, 0.01, Stretch::Inextensible, RestShape::Straight);
-    let pins = [Place::Start, Place::End].map(|p| world.insert_grip(&GripSpec::at_once(rod, way.place(p), Hold::Pin)).unwrap());
+    let pins = [Place::Start, Place::End]
+        .map(|p| world.insert_grip(&GripSpec::at_once(rod, way.place(p), Hold::Pin)).unwrap());
     way.settle(&mut world);
     let lowest = way.positions(&world, rod)[20];
     let [a, b] = pins.map(|p| way.force_back(world.grip_wrench(p).unwrap().force));
@@ -193,23 +211,31 @@ fn clamped_twist(way: &Way) -> Answers {
     vec![("middle", middle, 0.26e-3), ("torque at the start", a, a.length()), ("torque at the end", b, b.length())]
 }
 
-/// Over a cylinder of 10 mm, limp and formed to it, put there under small weights on rough surfaces, which is the same for all ways
-/// of solving: what friction carries depends on how the load came. Then the surfaces become smooth, and the weights 5 and 7 mN: a
-/// ratio of 1.4, where friction 0.3 could hold exp(0.3 pi) = 2.57.
+/// Over a cylinder of 10 mm, limp and formed to it, put there under small weights on rough surfaces, which is the same
+/// for all ways of solving: what friction carries depends on how the load came. Then the surfaces become smooth, and
+/// the weights 5 and 7 mN: a ratio of 1.4, where friction 0.3 could hold exp(0.3 pi) = 2.57.
 fn over_a_cylinder(way: &Way) -> Answers {
     let first = Way { turn: way.turn, mirror: way.mirror, reversed: way.reversed, scale: way.scale, ..PLAIN };
     let mut world = first.world(9.81, 1.0);
     let radius = 5e-3;
     let pose = Pose::new(DVec3::ZERO, (way.turn * DQuat::from_rotation_x(FRAC_PI_2)).normalize());
-    world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: radius * way.scale, half_length: 0.01 * way.scale }, pose)).unwrap();
+    world
+        .insert_shape(&ShapeSpec::fixed(
+            Geometry::Cylinder { radius: radius * way.scale, half_length: 0.01 * way.scale },
+            pose,
+        ))
+        .unwrap();
     let r = radius + 1.04 * 0.15e-3;
     let mut path = vec![DVec3::new(-r, 0.0, -0.02)];
     path.extend((0..=60).map(|i| DQuat::from_rotation_y(PI * f64::from(i) / 60.0) * DVec3::NEG_X * r));
     path.push(DVec3::new(r, 0.0, -0.015));
     let rod = first.thread(&mut world, &resample(&path, 60), 0.01, Stretch::Elastic, RestShape::AsInserted);
     let pulls = [(Place::Start, 5e-3), (Place::End, 7e-3)];
-    let kind =
-        |(place, f): (Place, f64), part: f64| LoadKind::Point { place: way.place(place), force: way.force(DVec3::NEG_Z * (f * part)), torque: DVec3::ZERO };
+    let kind = |(place, f): (Place, f64), part: f64| LoadKind::Point {
+        place: way.place(place),
+        force: way.force(DVec3::NEG_Z * (f * part)),
+        torque: DVec3::ZERO,
+    };
     let loads = pulls.map(|pull| world.insert_load(&LoadSpec { rod, kind: kind(pull, 0.05) }).unwrap());
     // While it is put down a substep may not converge (this test is of rest; how to get there is another one's).
     world.step(0.1 * way.scale);
@@ -250,7 +276,10 @@ fn numerics() -> Vec<(&'static str, Way)> {
 
 /// Kelvin-Voigt damping is of the material and not to be changed while a world runs.
 fn kelvin_voigt() -> Vec<(&'static str, Way)> {
-    vec![("no Kelvin-Voigt", Way { bend_damping: 0.0, ..PLAIN }), ("five times Kelvin-Voigt", Way { bend_damping: 0.05, ..PLAIN })]
+    vec![
+        ("no Kelvin-Voigt", Way { bend_damping: 0.0, ..PLAIN }),
+        ("five times Kelvin-Voigt", Way { bend_damping: 0.05, ..PLAIN }),
+    ]
 }
 
 /// The same thing otherwise placed, numbered or sized.
@@ -325,8 +354,8 @@ fn over_a_cylinder_whatever_the_numerics() {
 }
 #[test]
 fn over_a_cylinder_whatever_the_view() {
-    // Friction at a particle turns the element after it: numbered from the other end, the one before. First order in the elements,
-    // which are a twelfth of the arc that they touch.
+    // Friction at a particle turns the element after it: numbered from the other end, the one before. First order in
+    // the elements, which are a twelfth of the arc that they touch.
     compare(over_a_cylinder, &symmetries(), 1e-4);
 }
 

@@ -1,5 +1,5 @@
-//! Knot recognition against knots of known type: reference polylines, closed braids, connected sums, open ends, and what must not
-//! change an answer. Invariants are those of KnotInfo and of the tables that the polylines came with.
+//! Knot recognition against knots of known type: reference polylines, closed braids, connected sums, open ends, and
+//! what must not change an answer. Invariants are those of KnotInfo and of the tables that the polylines came with.
 
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -33,8 +33,9 @@ fn references() -> Vec<(&'static str, KnotType, u64, i32, &'static [i64])> {
     ]
 }
 
-/// Closed braid on `n` strands: letter `i` is a right-handed crossing of strands `i - 1` and `i`, `-i` a left-handed one. It
-/// starts on the outermost strand. Letter 0 is none: short words get enough of them for the polygon to stay round.
+/// Closed braid on `n` strands: letter `i` is a right-handed crossing of strands `i - 1` and `i`, `-i` a left-handed
+/// one. It starts on the outermost strand. Letter 0 is none: short words get enough of them for the polygon to stay
+/// round.
 fn closed_braid(n: usize, word: &[i32]) -> Vec<DVec3> {
     let mut word = word.to_vec();
     word.resize(word.len().max(14), 0);
@@ -72,7 +73,8 @@ fn closed_braid(n: usize, word: &[i32]) -> Vec<DVec3> {
 
 /// Stacked throws of these numbers of crossings (positive is right-handed), as a closed curve: their connected sum.
 fn throws(crossings: &[i32]) -> Vec<DVec3> {
-    let word: Vec<i32> = crossings.iter().zip(1..).flat_map(|(c, i)| (0..c.abs()).map(move |_| i * c.signum())).collect();
+    let word: Vec<i32> =
+        crossings.iter().zip(1..).flat_map(|(c, i)| (0..c.abs()).map(move |_| i * c.signum())).collect();
     closed_braid(crossings.len() + 1, &word)
 }
 
@@ -221,14 +223,21 @@ fn stacks_of_throws_are_named_closed_held_and_free() {
         assert_certain(&held, knot, determinant, signature, &what);
         assert_eq!((held.closures_agreed, held.closures_total), (1, 1));
         let free = recognize(&open, Ends::Free, 3);
-        assert_eq!((free.knot, free.determinant, free.signature, free.problem), (knot, determinant, signature, None), "{what}: {free}");
-        assert!(free.closures_total >= 20 && f64::from(free.closures_agreed) >= 0.9 * f64::from(free.closures_total), "{what}: {free}");
+        assert_eq!(
+            (free.knot, free.determinant, free.signature, free.problem),
+            (knot, determinant, signature, None),
+            "{what}: {free}"
+        );
+        assert!(
+            free.closures_total >= 20 && f64::from(free.closures_agreed) >= 0.9 * f64::from(free.closures_total),
+            "{what}: {free}"
+        );
     }
 }
 
-/// Prime knots that are no throws, and those that share invariants with knots that are: 8_20, 10_140 with the square knot, 10_132 with the
-/// double throw, 6_1 with the square knot's determinant and signature, 7_4 with the surgeon's. Braid words, determinants, |signatures|
-/// and polynomials of KnotInfo.
+/// Prime knots that are no throws, and those that share invariants with knots that are: 8_20, 10_140 with the square
+/// knot, 10_132 with the double throw, 6_1 with the square knot's determinant and signature, 7_4 with the surgeon's.
+/// Braid words, determinants, |signatures| and polynomials of KnotInfo.
 #[test]
 fn knots_that_only_resemble_are_unknown_with_their_invariants() {
     type Row = (&'static str, usize, &'static [i32], u64, u32, &'static [i64]);
@@ -249,8 +258,16 @@ fn knots_that_only_resemble_are_unknown_with_their_invariants() {
         let points = closed_braid(strands, word);
         for seed in 0..10 {
             let r = recognize(&points, Ends::Closed, seed);
-            assert_eq!((r.knot, r.problem, r.name(), r.is_certain()), (KnotType::Unknown, None, "unnamed", true), "{name}: {r}");
-            assert_eq!((r.determinant, r.signature.unsigned_abs(), r.alexander.as_slice()), (determinant, signature, alexander), "{name}: {r}");
+            assert_eq!(
+                (r.knot, r.problem, r.name(), r.is_certain()),
+                (KnotType::Unknown, None, "unnamed", true),
+                "{name}: {r}"
+            );
+            assert_eq!(
+                (r.determinant, r.signature.unsigned_abs(), r.alexander.as_slice()),
+                (determinant, signature, alexander),
+                "{name}: {r}"
+            );
             let mirrored = recognize(&mirrored(&points), Ends::Closed, seed);
             assert_eq!((mirrored.knot, mirrored.signature), (KnotType::Unknown, -r.signature), "{name}");
         }
@@ -271,7 +288,13 @@ fn bending_space_changes_nothing() {
             let n = [300, 600, 1200][seed as usize % 3];
             // Pieces short enough for the polygon to follow the bent curve.
             let points = bent(&resampled(&throws(crossings), true, n), seed);
-            assert_certain(&recognize(&points, Ends::Closed, seed), knot, determinant, signature, &format!("{crossings:?} bent {seed}"));
+            assert_certain(
+                &recognize(&points, Ends::Closed, seed),
+                knot,
+                determinant,
+                signature,
+                &format!("{crossings:?} bent {seed}"),
+            );
         }
     }
 }
@@ -314,15 +337,21 @@ fn wandering_tails_do_not_hide_the_knot() {
 #[test]
 fn an_end_inside_the_loop_is_unknown() {
     let trefoil = torus_trefoil(400, 1.0);
-    let knots = |percent: usize| (0..10).map(|seed| recognize(&trefoil[..4 * percent], Ends::Free, seed).knot).collect::<Vec<_>>();
+    let knots = |percent: usize| {
+        (0..10).map(|seed| recognize(&trefoil[..4 * percent], Ends::Free, seed).knot).collect::<Vec<_>>()
+    };
     assert!(knots(70).iter().all(|k| *k == KnotType::Unknot));
     assert!(knots(95).iter().all(|k| *k == KnotType::Trefoil(Hand::Right)));
     let between = knots(84);
     assert!(between.iter().filter(|k| **k == KnotType::Unknown).count() >= 7, "{between:?}");
     // What is not certain is another thing than a knot without a name.
-    let unsure = (0..10).map(|seed| recognize(&trefoil[..336], Ends::Free, seed)).filter(|r| r.knot == KnotType::Unknown);
+    let unsure =
+        (0..10).map(|seed| recognize(&trefoil[..336], Ends::Free, seed)).filter(|r| r.knot == KnotType::Unknown);
     assert!(unsure.into_iter().all(|r| r.name() == "unknown" && !r.is_certain()));
-    assert!(between.iter().all(|k| matches!(k, KnotType::Unknown | KnotType::Unknot | KnotType::Trefoil(Hand::Right))), "{between:?}");
+    assert!(
+        between.iter().all(|k| matches!(k, KnotType::Unknown | KnotType::Unknot | KnotType::Trefoil(Hand::Right))),
+        "{between:?}"
+    );
 }
 
 #[test]
@@ -352,13 +381,19 @@ fn input_that_makes_no_sense_is_a_problem_and_no_panic() {
         assert_eq!((r.knot, r.problem), (KnotType::Unknown, Some(Problem::TooTangled)));
     }
     // A curve through itself has no knot type: any answer but a knot.
-    let eight: Vec<DVec3> = (0..40).map(|k| f64::from(k) * TAU / 40.0).map(|t| DVec3::new(t.sin(), (2.0 * t).sin(), 0.0)).collect();
+    let eight: Vec<DVec3> =
+        (0..40).map(|k| f64::from(k) * TAU / 40.0).map(|t| DVec3::new(t.sin(), (2.0 * t).sin(), 0.0)).collect();
     assert!(matches!(recognize(&eight, Ends::Closed, 0).knot, KnotType::Unknot | KnotType::Unknown));
     // Straight, planar, tiny, huge, and far away: all unknots.
     let straight: Vec<DVec3> = (0..500).map(|k| x(f64::from(k))).collect();
-    let circle: Vec<DVec3> = (0..500).map(|k| f64::from(k) * TAU / 500.0).map(|t| DVec3::new(t.cos(), t.sin(), 0.0)).collect();
-    for (points, ends) in [(&straight, Ends::Free), (&straight, Ends::Held { start: -DVec3::X, end: DVec3::X }), (&circle, Ends::Closed), (&circle, Ends::Free)]
-    {
+    let circle: Vec<DVec3> =
+        (0..500).map(|k| f64::from(k) * TAU / 500.0).map(|t| DVec3::new(t.cos(), t.sin(), 0.0)).collect();
+    for (points, ends) in [
+        (&straight, Ends::Free),
+        (&straight, Ends::Held { start: -DVec3::X, end: DVec3::X }),
+        (&circle, Ends::Closed),
+        (&circle, Ends::Free),
+    ] {
         for scale in [1e-200, 1e-6, 1.0, 1e150] {
             let scaled: Vec<DVec3> = points.iter().map(|p| *p * scale + DVec3::splat(3.0 * scale)).collect();
             assert_certain(&recognize(&scaled, ends, 0), KnotType::Unknot, 1, 0, "straight or planar");
@@ -387,7 +422,8 @@ fn the_same_seed_gives_the_same_answer() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
-    /// Turned, moved, scaled, started elsewhere, read backward, and disturbed by less than half the distance of its strands.
+    /// Turned, moved, scaled, started elsewhere, read backward, and disturbed by less than half the distance of its
+    /// strands.
     #[test]
     fn recognition_sees_only_the_knot(
         which in 0..17_usize, seed: u64, axis in (-1.0..1.0, -1.0..1.0, -1.0..1.0), angle in 0.0..TAU, scale in -6.0..6.0, start in 0..200_usize,
@@ -455,10 +491,15 @@ fn writhe_of_the_torus_trefoil() {
 #[test]
 fn writhe_of_a_long_helix_is_fullers() {
     // n (1 - p / sqrt(p^2 + (2 pi a)^2)) but for the ends, which give O(1): 20 turns against 40 take them out.
-    let helix =
-        |turns: usize| -> Vec<DVec3> { (0..=turns * 40).map(|k| k as f64 / 40.0).map(|t| DVec3::new((TAU * t).cos(), (TAU * t).sin(), TAU * t)).collect() };
+    let helix = |turns: usize| -> Vec<DVec3> {
+        (0..=turns * 40)
+            .map(|k| k as f64 / 40.0)
+            .map(|t| DVec3::new((TAU * t).cos(), (TAU * t).sin(), TAU * t))
+            .collect()
+    };
     let per_turn = (writhe(&helix(40), false) - writhe(&helix(20), false)) / 20.0;
-    // Pitch 2 pi, radius 1. Polygons of 40 sides a turn differ by (2 pi / 40)^2 / 6, the ends' remainder is of the order 1 / 20^2.
+    // Pitch 2 pi, radius 1. Polygons of 40 sides a turn differ by (2 pi / 40)^2 / 6, the ends' remainder is of the
+    // order 1 / 20^2.
     assert!((per_turn - (1.0 - 0.5_f64.sqrt())).abs() < 4e-3, "{per_turn}");
 }
 
@@ -466,7 +507,12 @@ fn writhe_of_a_long_helix_is_fullers() {
 fn writhe_changes_by_two_where_the_thread_passes_through_itself() {
     // The upper strand of a crossing at height +h and -h.
     let at = |h: f64| {
-        let mut p = vec![DVec3::new(-5.0, 0.0, 0.0), DVec3::new(5.0, 0.0, 0.0), DVec3::new(8.0, 6.0, 0.3), DVec3::new(0.1, 5.0, h)];
+        let mut p = vec![
+            DVec3::new(-5.0, 0.0, 0.0),
+            DVec3::new(5.0, 0.0, 0.0),
+            DVec3::new(8.0, 6.0, 0.3),
+            DVec3::new(0.1, 5.0, h),
+        ];
         p.extend([DVec3::new(0.0, -5.0, h), DVec3::new(-8.0, -6.0, 0.4)]);
         p
     };
@@ -487,20 +533,39 @@ fn linking_numbers_are_integers() {
     assert!((gauss_linking(&a, &b) + gauss_linking(&a, &back)).abs() < 1e-12);
     assert!(gauss_linking(&a, &away).abs() < 1e-12);
     for n in [2.0, 3.0, 5.0] {
-        let helix: Vec<DVec3> =
-            circle(300).map(|t| DVec3::new((1.0 + 0.3 * (n * t).cos()) * t.cos(), (1.0 + 0.3 * (n * t).cos()) * t.sin(), 0.3 * (n * t).sin())).collect();
+        let helix: Vec<DVec3> = circle(300)
+            .map(|t| {
+                DVec3::new(
+                    (1.0 + 0.3 * (n * t).cos()) * t.cos(),
+                    (1.0 + 0.3 * (n * t).cos()) * t.sin(),
+                    0.3 * (n * t).sin(),
+                )
+            })
+            .collect();
         assert!((gauss_linking(&a, &helix).abs() - n).abs() < 1e-11);
     }
 }
 
-/// Two strands side by side over a length of 20 diameters, apart by 45 degrees at both ends, with a long loop between: the arc lengths
-/// of the corners. `tail` is added to the first tail; the last one may come back and lie across the loop.
+/// Two strands side by side over a length of 20 diameters, apart by 45 degrees at both ends, with a long loop between:
+/// the arc lengths of the corners. `tail` is added to the first tail; the last one may come back and lie across the
+/// loop.
 fn side_by_side(tail: f64, across: bool) -> (Vec<DVec3>, [f64; 4]) {
     let (half, wide) = (10.0, 20.0);
     let p = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
     let diagonal = DVec3::new(-1.0, -1.0, 0.0).normalize();
-    let mut corners = vec![p(-half - wide, -wide, 0.0) + diagonal * tail, p(-half, 0.0, 0.0), p(half, 0.0, 0.0), p(half + wide, -wide, 0.0)];
-    corners.extend([p(half + 3.0 * wide, 0.0, 0.0), p(half + wide, 1.0 + wide, 0.0), p(half, 1.0, 0.0), p(-half, 1.0, 0.0), p(-half - wide, 1.0 + wide, 0.0)]);
+    let mut corners = vec![
+        p(-half - wide, -wide, 0.0) + diagonal * tail,
+        p(-half, 0.0, 0.0),
+        p(half, 0.0, 0.0),
+        p(half + wide, -wide, 0.0),
+    ];
+    corners.extend([
+        p(half + 3.0 * wide, 0.0, 0.0),
+        p(half + wide, 1.0 + wide, 0.0),
+        p(half, 1.0, 0.0),
+        p(-half, 1.0, 0.0),
+        p(-half - wide, 1.0 + wide, 0.0),
+    ]);
     if across {
         corners.extend([p(0.0, 60.0, 1.0), p(half + 2.0 * wide, 60.0, 1.0), p(half + 2.0 * wide, -60.0, 1.0)]);
     }
@@ -541,7 +606,8 @@ fn entries_are_material() {
     let points = resampled(&corners, false, 300);
     let e = entries(&points, &lengths(&points), 0.5).unwrap();
     let moved: Vec<DVec3> = points.iter().map(|p| DQuat::from_rotation_y(0.8) * *p * 1.2 + DVec3::splat(7.0)).collect();
-    // What counts as a neighbor along the thread is measured in rest length, so it changes a little; no contact is that near.
+    // What counts as a neighbor along the thread is measured in rest length, so it changes a little; no contact is that
+    // near.
     let after = entries(&moved, &lengths(&points), 0.6).unwrap();
     assert!(after.slip_since(&e) < 1e-9, "{after:?} {e:?}");
 }
@@ -588,7 +654,8 @@ fn the_audit_sees_every_substep_of_a_world() {
     let report = audit.report();
     assert_eq!((report.states, report.states_not_finite, report.passes_through), (substeps, 0, false));
     assert_eq!((report.thread_clearance, report.shape_clearance), (None, None));
-    // It falls freely: g t^2 / 2 is 49 mm, and nothing stretches it beyond round-off of its position over its element length.
+    // It falls freely: g t^2 / 2 is 49 mm, and nothing stretches it beyond round-off of its position over its element
+    // length.
     assert!(world.rod(rod).unwrap().positions()[0].z < -0.04);
     assert_eq!(report.max_elongation[0].0, rod.index());
     assert!(report.max_elongation[0].1 < 1e-9, "{:?}", report.max_elongation);

@@ -8,8 +8,9 @@ use support::{overhand, settle, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Input, Recorder, Recording};
 use sutura::{
-    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material, PaperSettings, Place, Plasticity, Pose,
-    Profile, ReelLaw, ReelSpec, Rod, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, WeldSpec, World,
+    Along, Closure, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Integrator, LoadKind, LoadSpec, Material,
+    PaperSettings, Place, Plasticity, Pose, Profile, ReelLaw, ReelSpec, Rod, RodSpec, Section, Settings, ShapeMotion,
+    ShapeSpec, Shear, Solver, Stretch, WeldSpec, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -94,14 +95,23 @@ fn period(world: &mut World, rod: Handle<Rod>, time: f64) -> f64 {
 #[test]
 fn it_swings_as_its_new_density_says() {
     let material = with_modulus(2e9);
-    let settings = Settings { gravity: DVec3::ZERO, substep: 1.0 / 4000.0, integrator: Integrator::TrBdf2, ..Settings::default() };
+    let settings =
+        Settings { gravity: DVec3::ZERO, substep: 1.0 / 4000.0, integrator: Integrator::TrBdf2, ..Settings::default() };
     let (mut world, rod) = cantilever(material.clone(), &settings, DQuat::IDENTITY);
     // A push that bends it in its first mode, nearly.
     let push = LoadKind::Uniform { force_per_length: DVec3::Z * 2e-5 };
     let load = world.insert_load(&LoadSpec { rod, kind: push }).unwrap();
-    world.set_settings(Settings { linear_damping: 0.9999, integrator: Integrator::ImplicitEuler, ..world.settings().clone() }).unwrap();
+    world
+        .set_settings(Settings {
+            linear_damping: 0.9999,
+            integrator: Integrator::ImplicitEuler,
+            ..world.settings().clone()
+        })
+        .unwrap();
     (0..300).for_each(|_| drop(world.step(1.0 / 240.0)));
-    world.set_settings(Settings { linear_damping: 0.0, integrator: Integrator::TrBdf2, ..world.settings().clone() }).unwrap();
+    world
+        .set_settings(Settings { linear_damping: 0.0, integrator: Integrator::TrBdf2, ..world.settings().clone() })
+        .unwrap();
     world.remove_load(load).unwrap();
     let section = PI * t1().1.powi(2);
     let closed = |density: f64| {
@@ -122,7 +132,9 @@ fn hung(stretch: Stretch) -> (World, Handle<Rod>, f64) {
     let spec = RodSpec { stretch, ..RodSpec::straight(DVec3::ZERO, DVec3::NEG_Z * 0.1, 20, t1().1, with_modulus(2e9)) };
     let rod = world.insert_rod(&spec).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 0.1, inertia: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec { rod, kind: LoadKind::Mass { place: Place::End, mass: 0.1, inertia: DVec3::ZERO } })
+        .unwrap();
     (world, rod, PI * t1().1.powi(2))
 }
 
@@ -203,7 +215,8 @@ fn plastic_set_and_hardening_are_kept() {
     world.remove_load(load).unwrap();
     (0..60).for_each(|_| drop(world.step(DT)));
     assert!((tip(&world, rod) - left).length() < 1e-6, "{} {left}", tip(&world, rod));
-    // As it was, and from the same state on: the same bits as in the world where nothing was changed, hardening included.
+    // As it was, and from the same state on: the same bits as in the world where nothing was changed, hardening
+    // included.
     let start = other.snapshot();
     world.set_material(rod, &soft).unwrap();
     world.restore(&start).unwrap();
@@ -234,7 +247,15 @@ fn plastic_set_and_hardening_are_kept() {
 /// Everything that a material gives to the elements of a thread.
 fn made(world: &World, rod: Handle<Rod>) -> Vec<u64> {
     let r = world.rod(rod).unwrap();
-    let of = |e: usize| [r.axial_stiffness(e), r.bending_stiffness(e).x, r.bending_stiffness(e).y, r.bending_stiffness(e).z, r.mass_per_length(e)];
+    let of = |e: usize| {
+        [
+            r.axial_stiffness(e),
+            r.bending_stiffness(e).x,
+            r.bending_stiffness(e).y,
+            r.bending_stiffness(e).z,
+            r.mass_per_length(e),
+        ]
+    };
     (0..r.n_elements()).flat_map(of).map(f64::to_bits).collect()
 }
 
@@ -243,7 +264,13 @@ fn sections_along_it_are_multiplied_as_before() {
     let profile = |a: f64, b: f64| Profile(vec![(0.0, a), (0.02, b), (0.04, a * b)]);
     let along = Along { size: profile(1.0, 0.7), modulus: profile(1.0, 3.0), density: profile(2.0, 1.0) };
     let first = Material { shear: Shear::Modulus(0.9e9), ..with_modulus(2e9) };
-    let second = Material { shear: Shear::Poisson(0.2), density: 3000.0, bend_scale: 0.3, bend_damping: 2e-3, ..with_modulus(7e8) };
+    let second = Material {
+        shear: Shear::Poisson(0.2),
+        density: 3000.0,
+        bend_scale: 0.3,
+        bend_damping: 2e-3,
+        ..with_modulus(7e8)
+    };
     let spec = |material: &Material| RodSpec {
         along: along.clone(),
         section: Section::Rectangle([4e-4, 1e-4]),
@@ -266,7 +293,13 @@ fn sections_along_it_are_multiplied_as_before() {
     }
     // Plastic set is not for what bends more easily one way, also afterwards.
     let set = Plasticity { yield_curvature: 20.0, yield_twist: 20.0, hardening: 0.2 };
-    assert!(world.set_material(rod, &Material { plasticity: Some(set), ..second }).unwrap_err().to_string().contains("plasticity"));
+    assert!(
+        world
+            .set_material(rod, &Material { plasticity: Some(set), ..second })
+            .unwrap_err()
+            .to_string()
+            .contains("plasticity")
+    );
 }
 
 #[test]
@@ -304,7 +337,8 @@ fn elements_that_a_reel_has_cut_are_of_the_new_material_too() {
 
 #[test]
 fn seams_and_clamps_bend_as_the_new_material_does() {
-    // A ring, twisted before it was closed by less than what makes it buckle: torque G J twist / length all along, its seam included.
+    // A ring, twisted before it was closed by less than what makes it buckle: torque G J twist / length all along, its
+    // seam included.
     let mut world = World::new(Settings { gravity: DVec3::ZERO, ..damped() }).unwrap();
     let ring = RodSpec::ring(DVec3::ZERO, DVec3::Z, DVec3::X * 0.01, 48, t1().1, with_modulus(2e9));
     let rod = world.insert_rod(&RodSpec { closure: Some(Closure { twist: 2.0 }), ..ring }).unwrap();
@@ -322,15 +356,18 @@ fn seams_and_clamps_bend_as_the_new_material_does() {
 
 /// Two threads, one across the other, held at their ends and drawn against each other.
 fn crossed(material: &Material) -> (World, [Handle<Rod>; 2], [Handle<Grip>; 2]) {
-    let mut world = World::new(Settings { gravity: DVec3::ZERO, friction: Friction::coulomb(0.0), ..damped() }).unwrap();
+    let mut world =
+        World::new(Settings { gravity: DVec3::ZERO, friction: Friction::coulomb(0.0), ..damped() }).unwrap();
     let r = t1().1;
     let below = RodSpec::straight(DVec3::NEG_X * 0.01, DVec3::X * 0.01, 20, r, material.clone());
-    let above = RodSpec::straight(DVec3::new(0.0, -0.01, 2.05 * r), DVec3::new(0.0, 0.01, 2.05 * r), 20, r, material.clone());
+    let above =
+        RodSpec::straight(DVec3::new(0.0, -0.01, 2.05 * r), DVec3::new(0.0, 0.01, 2.05 * r), 20, r, material.clone());
     let rods = [world.insert_rod(&below).unwrap(), world.insert_rod(&above).unwrap()];
     for place in [Place::Start, Place::End] {
         world.insert_grip(&GripSpec::at_once(rods[0], place, Hold::Clamp)).unwrap();
     }
-    let grips = [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(rods[1], place, Hold::Pin)).unwrap());
+    let grips = [Place::Start, Place::End]
+        .map(|place| world.insert_grip(&GripSpec::at_once(rods[1], place, Hold::Pin)).unwrap());
     (world, rods, grips)
 }
 
@@ -360,7 +397,8 @@ fn contacts_are_as_hard_as_the_new_material() {
     let (c, d) = (world.step(DT).thread_clearance.unwrap(), other.step(DT).thread_clearance.unwrap());
     println!("force {a} {b} N, clearance {c} {d}");
     assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
-    // Below the 0.02 that is kept where no force acts by what the soft surfaces give way; the hard ones would by a tenth of that.
+    // Below the 0.02 that is kept where no force acts by what the soft surfaces give way; the hard ones would by a
+    // tenth of that.
     assert!((c - d).abs() < 1e-5 && c < 0.0175, "{c} {d}");
 }
 
@@ -447,7 +485,8 @@ fn a_snapshot_holds_no_material() {
     }
 }
 
-/// Length of the state in a snapshot: behind the hash of materials are lists of threads (41 bytes each), shapes (12) and welds, of which there are none here.
+/// Length of the state in a snapshot: behind the hash of materials are lists of threads (41 bytes each), shapes (12)
+/// and welds, of which there are none here.
 fn state_of(snapshot: &[u8]) -> usize {
     let count = |at: usize| u64::from_le_bytes(snapshot[at..at + 8].try_into().unwrap()) as usize;
     let shapes = 16 + 8 + 41 * count(16);
@@ -467,7 +506,13 @@ fn change_everything(world: &mut Recorder) {
     world.set_settings(direct(world)).unwrap();
     frames(world, 6);
     let set = Plasticity { yield_curvature: 200.0, yield_twist: 300.0, hardening: 0.1 };
-    let other = Material { shear: Shear::Modulus(1e8), bend_scale: 0.5, bend_damping: 1e-3, plasticity: Some(set), ..with_modulus(0.5e9) };
+    let other = Material {
+        shear: Shear::Modulus(1e8),
+        bend_scale: 0.5,
+        bend_damping: 1e-3,
+        plasticity: Some(set),
+        ..with_modulus(0.5e9)
+    };
     world.set_material(rod, &other).unwrap();
     frames(world, 6);
     world.set_stretch(rod, Stretch::Inextensible).unwrap();
@@ -497,7 +542,8 @@ fn everything_is_recorded_and_done_again_bit_for_bit() {
     assert_eq!(again.unwrap().snapshot(), world.snapshot());
     // A recording of version 2 has none of these, and is the same otherwise.
     let mut plain = Recorder::new(Settings::default(), true).unwrap();
-    let rod = plain.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, 10, t1().1, with_modulus(2e9))).unwrap();
+    let rod =
+        plain.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, 10, t1().1, with_modulus(2e9))).unwrap();
     plain.step(DT);
     plain.remove_rod(rod).unwrap();
     let mut bytes = plain.recording().unwrap().to_bytes();
@@ -558,7 +604,9 @@ fn the_solver_is_not_switched_to_one_that_does_not_know_what_there_is() {
     type Put = fn(&mut World, Handle<Rod>);
     let put: [(&str, Put); 6] = [
         ("weld", |world, rod| {
-            let other = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::Y * 0.05, 10, t1().1, with_modulus(2e9))).unwrap();
+            let other = world
+                .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::Y * 0.05, 10, t1().1, with_modulus(2e9)))
+                .unwrap();
             world.insert_weld(&WeldSpec::new(vec![(rod, Place::Start), (other, Place::Start)])).unwrap();
         }),
         ("reel", |world, rod| {
@@ -635,10 +683,13 @@ fn switched_where_threads_touch_it_goes_on() {
         assert!(report.incidents.is_empty(), "{:?}", report.incidents);
     }
     println!("tension {tension} then {}, contacts {contacts} then {}", ends(&world), world.contacts().count());
-    // The paper's solver has stretched the thread by an eighth or more. It comes back over the post against friction, so where it stops is within what friction can
-    // hold, exp(mu pi), not where it was.
+    // The paper's solver has stretched the thread by an eighth or more. It comes back over the post against friction,
+    // so where it stops is within what friction can hold, exp(mu pi), not where it was.
     assert!((ends(&world) / tension).ln().abs() < 0.3 * PI, "{tension} {}", ends(&world));
-    assert!(world.rod(rod).unwrap().energy().kinetic < 1e-6 * world.rod(rod).unwrap().energy().bend.max(1e-9), "it rests");
+    assert!(
+        world.rod(rod).unwrap().energy().kinetic < 1e-6 * world.rod(rod).unwrap().energy().bend.max(1e-9),
+        "it rests"
+    );
     assert!(world.contacts().count() > contacts / 2);
     assert!(world.rod(rod).unwrap().max_elongation() < 1e-4);
 }

@@ -21,7 +21,12 @@ fn tip(world: &World, rod: Handle<Rod>) -> DVec3 {
 }
 
 /// Elastica under a dead tip load P: (P L^2 / EI, x_tip / L, drop / L). Elliptic integrals.
-const TIP_LOAD: [(f64, f64, f64); 4] = [(0.1, 0.999_335, 0.033_295), (1.0, 0.943_567, 0.301_721), (5.0, 0.612_372, 0.713_792), (10.0, 0.445_004, 0.810_609)];
+const TIP_LOAD: [(f64, f64, f64); 4] = [
+    (0.1, 0.999_335, 0.033_295),
+    (1.0, 0.943_567, 0.301_721),
+    (5.0, 0.612_372, 0.713_792),
+    (10.0, 0.445_004, 0.810_609),
+];
 
 #[test]
 fn elastica_under_tip_load_is_second_order() {
@@ -32,7 +37,9 @@ fn elastica_under_tip_load_is_second_order() {
             let (mut world, rod) = cantilever(length, n, quiet());
             let ei = world.rod(rod).unwrap().bending_stiffness(0).x;
             let force = DVec3::NEG_Z * (k * ei / (length * length));
-            world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+            world
+                .insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } })
+                .unwrap();
             settle(&mut world, 0.1, 1e-7, 200.0);
             let p = tip(&world, rod) / length;
             errors.push((p - DVec3::new(x, 0.0, -drop)).length());
@@ -56,16 +63,27 @@ fn elastica_under_self_weight() {
 
 #[test]
 fn a_tip_moment_of_a_quarter_turn_makes_a_quarter_circle() {
-    // A dead moment has no energy: from about half a turn on it feeds a flutter out of the plane. A quarter turn is stable.
+    // A dead moment has no energy: from about half a turn on it feeds a flutter out of the plane. A quarter turn is
+    // stable.
     let mut errors = Vec::new();
     for n in [20, 40] {
         let length = 0.05;
         let (mut world, rod) = cantilever(length, n, quiet());
         let ei = world.rod(rod).unwrap().bending_stiffness(0).x;
         let torque = DVec3::NEG_Y * (core::f64::consts::FRAC_PI_2 * ei / length);
-        let load = world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: DVec3::ZERO } }).unwrap();
+        let load = world
+            .insert_load(&LoadSpec {
+                rod,
+                kind: LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: DVec3::ZERO },
+            })
+            .unwrap();
         for i in 1..=40 {
-            world.set_load(load, LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: torque * (f64::from(i) / 40.0) }).unwrap();
+            world
+                .set_load(
+                    load,
+                    LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: torque * (f64::from(i) / 40.0) },
+                )
+                .unwrap();
             world.step(0.1);
         }
         for _ in 0..100 {
@@ -123,7 +141,9 @@ fn the_elastic_energy_of_a_cantilever_is_half_the_work_of_its_load() {
         let (mut world, rod) = cantilever(0.05, n, quiet());
         let force = DVec3::NEG_Z * 1e-5;
         let before = tip(&world, rod);
-        world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+        world
+            .insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } })
+            .unwrap();
         settle(&mut world, 0.1, 1e-9, 200.0);
         let work = 0.5 * force.dot(tip(&world, rod) - before);
         let energy = world.rod(rod).unwrap().energy().total();

@@ -1,11 +1,13 @@
-//! What is put where something is already: the step says what, where and how deep, and time that was not simulated is not counted as if it were.
+//! What is put where something is already: the step says what, where and how deep, and time that was not simulated is
+//! not counted as if it were.
 
 mod support;
 
 use support::t1;
 use sutura::glam::DVec3;
 use sutura::{
-    Geometry, GripSpec, Hold, Incident, IncidentKind, Overlap, OverlapWith, Place, Pose, RodSpec, Settings, ShapeMotion, ShapeSpec, Solver, StepReport, World,
+    Geometry, GripSpec, Hold, Incident, IncidentKind, Overlap, OverlapWith, Place, Pose, RodSpec, Settings,
+    ShapeMotion, ShapeSpec, Solver, StepReport, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -43,10 +45,22 @@ fn the_first_step_after_an_insertion_names_what_lies_in_what() {
     let o = found[0];
     let OverlapWith::Rod { rod, arc } = o.with else { panic!("{o:?}") };
     assert_eq!((o.rod, rod, o.through), (a, b, true));
-    assert!((o.arc - 0.012).abs() < 1e-9 && (arc - 0.01).abs() < 1e-9 && (o.diameters - 0.61).abs() < 1e-6 && (o.depth - 1.22 * radius).abs() < 1e-9, "{o:?}");
+    assert!(
+        (o.arc - 0.012).abs() < 1e-9
+            && (arc - 0.01).abs() < 1e-9
+            && (o.diameters - 0.61).abs() < 1e-6
+            && (o.depth - 1.22 * radius).abs() < 1e-9,
+        "{o:?}"
+    );
     assert!((o.point - DVec3::new(2e-3, 0.0, 0.39 * radius)).length() < 1e-9);
     let words = report.incidents[0].kind.to_string();
-    assert!(words.contains("#0.0") && words.contains("#1.0") && words.contains("0.61 diameters") && words.contains("passes through"), "{words}");
+    assert!(
+        words.contains("#0.0")
+            && words.contains("#1.0")
+            && words.contains("0.61 diameters")
+            && words.contains("passes through"),
+        "{words}"
+    );
     // It is said once.
     assert!(told(&world.step(DT)).is_empty());
 }
@@ -83,25 +97,39 @@ fn shapes_put_onto_threads_are_named() {
         found.iter().map(|o| (o.rod, o.with, o.through)).collect::<Vec<_>>(),
         [(rod, OverlapWith::Shape(ball), true), (rod, OverlapWith::Shape(plane), false)]
     );
-    assert!((found[0].depth - 0.5e-3 - radius).abs() < 1e-7 && (found[0].arc - 6e-3).abs() < 1e-4 && (found[1].depth - 0.4 * radius).abs() < 1e-9, "{found:?}");
+    assert!(
+        (found[0].depth - 0.5e-3 - radius).abs() < 1e-7
+            && (found[0].arc - 6e-3).abs() < 1e-4
+            && (found[1].depth - 0.4 * radius).abs() < 1e-9,
+        "{found:?}"
+    );
 }
 
 #[test]
 fn a_shape_that_jumps_into_a_thread_is_named() {
     // The paper's solver moves shapes to where they are wanted, whatever is there: here a thread that is held.
-    let mut world = World::new(Settings { gravity: DVec3::ZERO, solver: Solver::Paper(Default::default()), ..Settings::default() }).unwrap();
+    let mut world =
+        World::new(Settings { gravity: DVec3::ZERO, solver: Solver::Paper(Default::default()), ..Settings::default() })
+            .unwrap();
     let rod = world.insert_rod(&along_x(0.0)).unwrap();
     for place in [Place::Start, Place::Particle(10), Place::End] {
         world.insert_grip(&GripSpec::at_once(rod, place, Hold::Pin)).unwrap();
     }
-    let bar = ShapeSpec { motion: ShapeMotion::Driven, ..ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::splat(5e-3) }, Pose::at(DVec3::Z * 10.0)) };
+    let bar = ShapeSpec {
+        motion: ShapeMotion::Driven,
+        ..ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::splat(5e-3) }, Pose::at(DVec3::Z * 10.0))
+    };
     let bar = world.insert_shape(&bar).unwrap();
     assert!(told(&world.step(DT)).is_empty());
     world.set_shape_pose(bar, Pose::at(DVec3::ZERO)).unwrap();
     let report = world.step(DT);
     assert!(report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Teleport { .. })));
     let found = told(&report);
-    assert!(!found.is_empty() && found.iter().all(|o| o.rod == rod && o.with == OverlapWith::Shape(bar)), "{:?}", report.incidents);
+    assert!(
+        !found.is_empty() && found.iter().all(|o| o.rod == rod && o.with == OverlapWith::Shape(bar)),
+        "{:?}",
+        report.incidents
+    );
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! The paper's solver as a whole: what it keeps, what it reaches at the paper's effective scale and at true size, what it refuses.
+//! The paper's solver as a whole: what it keeps, what it reaches at the paper's effective scale and at true size, what
+//! it refuses.
 
 mod support;
 
@@ -6,8 +7,8 @@ use core::f64::consts::TAU;
 use support::t1;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Geometry, GripSpec, Handle, Hold, IncidentKind, LoadKind, LoadSpec, Material, PaperSettings, Place, Plasticity, Pose, Rod, RodSpec, Settings,
-    ShapeMotion, ShapeSpec, Solver, SweepOrder, World,
+    Drive, Geometry, GripSpec, Handle, Hold, IncidentKind, LoadKind, LoadSpec, Material, PaperSettings, Place,
+    Plasticity, Pose, Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, Solver, SweepOrder, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -23,12 +24,15 @@ fn helix(length: f64, p: PaperSettings) -> (World, Handle<Rod>) {
     let (r, pitch) = (length / 30.0, length / 15.0);
     let turns = length / ((TAU * r).powi(2) + pitch * pitch).sqrt();
     let material = Material::elastic(2e9, 1150.0);
-    let rod = world.insert_rod(&RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * r, turns, pitch, 120, length / 240.0, material)).unwrap();
+    let rod = world
+        .insert_rod(&RodSpec::helix(DVec3::ZERO, DVec3::X, DVec3::Y * r, turns, pitch, 120, length / 240.0, material))
+        .unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
     (world, rod)
 }
 
-/// Largest part by which the whole thread is longer than at rest at the end of a frame, over five seconds; infinite where it leaves all bounds.
+/// Largest part by which the whole thread is longer than at rest at the end of a frame, over five seconds; infinite
+/// where it leaves all bounds.
 fn elongation(length: f64, p: PaperSettings) -> f64 {
     let (mut world, rod) = helix(length, p);
     let mut worst = 0.0f64;
@@ -46,7 +50,9 @@ fn elongation(length: f64, p: PaperSettings) -> f64 {
 const BUDGETS: [u32; 4] = [5, 10, 20, 40];
 
 fn elongations(length: f64, direct_distance: bool) -> [f64; 4] {
-    let found = BUDGETS.map(|iterations| elongation(length, PaperSettings { iterations, direct_distance, ..PaperSettings::default() }));
+    let found = BUDGETS.map(|iterations| {
+        elongation(length, PaperSettings { iterations, direct_distance, ..PaperSettings::default() })
+    });
     println!("{length} m, {}: {:?} %", if direct_distance { "DDC" } else { "no DDC" }, found.map(|e| 100.0 * e));
     found
 }
@@ -77,8 +83,11 @@ fn a_free_thread_keeps_its_momentum() {
     for order in [SweepOrder::Natural, SweepOrder::TwoColor] {
         let settings = Settings { gravity: DVec3::ZERO, ..paper(PaperSettings { order, ..PaperSettings::default() }) };
         let mut world = World::new(settings).unwrap();
-        let points: Vec<DVec3> =
-            (0..=40).map(|i| DVec3::new(f64::from(i), 5.0 * (0.3 * f64::from(i)).sin(), 4.0 * (0.2 * f64::from(i)).cos()) * 1e-3).collect();
+        let points: Vec<DVec3> = (0..=40)
+            .map(|i| {
+                DVec3::new(f64::from(i), 5.0 * (0.3 * f64::from(i)).sin(), 4.0 * (0.2 * f64::from(i)).cos()) * 1e-3
+            })
+            .collect();
         let rod = world.insert_rod(&RodSpec::new(points, radius, material.clone())).unwrap();
         // It snaps straight, which turns and stretches everything.
         world.step(DT);
@@ -90,7 +99,8 @@ fn a_free_thread_keeps_its_momentum() {
         }
         let view = world.rod(rod).unwrap();
         let mass = view.mass_per_length(0) * view.rest_length();
-        // Rounding of positions, at most 7e-18 m in each of 20 iterations of 51 steps, over the length of a step, is 4e-13 m/s.
+        // Rounding of positions, at most 7e-18 m in each of 20 iterations of 51 steps, over the length of a step, is
+        // 4e-13 m/s.
         assert!((view.momentum() / mass).length() < 4e-13, "{order:?}: {}", view.momentum() / mass);
     }
 }
@@ -120,12 +130,18 @@ fn grips_hold_particles_and_frames() {
     let homes = [clamp, pin, jaw].map(|g| world.grip_pose(g).unwrap());
     for k in 1..=120 {
         let s = f64::from(k) / 120.0;
-        let moved = Pose::new(homes[2].position - DVec3::X * (0.05 * s), DQuat::from_rotation_x(TAU * s) * homes[2].orientation);
+        let moved = Pose::new(
+            homes[2].position - DVec3::X * (0.05 * s),
+            DQuat::from_rotation_x(TAU * s) * homes[2].orientation,
+        );
         world.set_grip_pose(jaw, moved).unwrap();
         let report = world.step(DT);
         assert!(report.incidents.is_empty() && report.substeps == 1);
         let now = world.grip_pose(jaw).unwrap();
-        assert!((now.position - moved.position).length() < 1e-15 && (now.orientation.dot(moved.orientation).abs() - 1.0).abs() < 1e-12);
+        assert!(
+            (now.position - moved.position).length() < 1e-15
+                && (now.orientation.dot(moved.orientation).abs() - 1.0).abs() < 1e-12
+        );
     }
     assert_eq!(world.grip_pose(pin).unwrap().position, homes[1].position);
     assert_eq!(world.grip_pose(clamp).unwrap().position, homes[0].position);
@@ -140,7 +156,12 @@ fn a_thread_lands_on_a_plane() {
     for (friction, slides) in [(1.0, false), (0.0, true)] {
         let radius = 1e-3;
         let gravity = DVec3::new(0.1, 0.0, -9.0);
-        let mut world = World::new(Settings { gravity, linear_damping: 0.9, ..paper(PaperSettings { friction, ..PaperSettings::default() }) }).unwrap();
+        let mut world = World::new(Settings {
+            gravity,
+            linear_damping: 0.9,
+            ..paper(PaperSettings { friction, ..PaperSettings::default() })
+        })
+        .unwrap();
         world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY)).unwrap();
         let (from, to) = (DVec3::new(0.0, 0.0, 0.05), DVec3::new(0.0, 0.06, 0.05));
         let rod = world.insert_rod(&RodSpec::straight(from, to, 30, radius, Material::elastic(1e8, 1150.0))).unwrap();
@@ -167,7 +188,8 @@ fn swept_spheres_do_not_pass() {
     let radius = 1e-3;
     let mut world = World::new(Settings { gravity: DVec3::ZERO, ..paper(PaperSettings::default()) }).unwrap();
     let material = Material::elastic(1e8, 1150.0);
-    let held = world.insert_rod(&RodSpec::straight(DVec3::X * -0.03, DVec3::X * 0.03, 30, radius, material.clone())).unwrap();
+    let held =
+        world.insert_rod(&RodSpec::straight(DVec3::X * -0.03, DVec3::X * 0.03, 30, radius, material.clone())).unwrap();
     for place in [Place::Start, Place::End] {
         world.insert_grip(&GripSpec::at_once(held, place, Hold::Clamp)).unwrap();
     }
@@ -197,7 +219,11 @@ fn what_the_paper_has_not_is_refused() {
         change(&mut world, rod);
         let before = world.rod(rod).unwrap().positions().to_vec();
         let report = world.step(DT);
-        assert!(matches!(report.incidents[..], [sutura::Incident { kind: IncidentKind::NotInPaper { .. }, .. }]), "{:?}", report.incidents);
+        assert!(
+            matches!(report.incidents[..], [sutura::Incident { kind: IncidentKind::NotInPaper { .. }, .. }]),
+            "{:?}",
+            report.incidents
+        );
         assert_eq!(world.rod(rod).unwrap().positions(), before);
         assert_eq!(report.time, DT);
     };
@@ -207,7 +233,12 @@ fn what_the_paper_has_not_is_refused() {
     });
     let motion = ShapeMotion::Pushed { direction: DVec3::X, force: 1.0, speed_limit: 0.1 };
     refused(&|world, _| {
-        world.insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Sphere { radius: 0.01 }, Pose::at(DVec3::Z)) }).unwrap();
+        world
+            .insert_shape(&ShapeSpec {
+                motion,
+                ..ShapeSpec::fixed(Geometry::Sphere { radius: 0.01 }, Pose::at(DVec3::Z))
+            })
+            .unwrap();
     });
     refused(&|world, _| {
         let start = DVec3::Y * 0.02;
@@ -218,7 +249,10 @@ fn what_the_paper_has_not_is_refused() {
         let far: Vec<DVec3> = spec.centerline.iter().map(|x| *x + DVec3::Z).collect();
         world.insert_rod(&RodSpec::new(far, radius, Material { plasticity, ..spec.material.clone() })).unwrap();
     });
-    for bad in [PaperSettings { iterations: 0, ..PaperSettings::default() }, PaperSettings { twist: 1.5, ..PaperSettings::default() }] {
+    for bad in [
+        PaperSettings { iterations: 0, ..PaperSettings::default() },
+        PaperSettings { twist: 1.5, ..PaperSettings::default() },
+    ] {
         assert!(World::new(paper(bad)).is_err());
     }
 }
@@ -249,10 +283,18 @@ fn steps_are_repeatable_and_allocate_nothing() {
 fn absurd_numbers_leave_a_finite_state() {
     let (material, radius) = t1();
     for size in [1e10, 1e20, 1e140, 1e300] {
-        let mut world = World::new(Settings { gravity: DVec3::new(0.1, 0.0, -1.0) * size, ..paper(PaperSettings::default()) }).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.03, 20, radius, material.clone())).unwrap();
+        let mut world =
+            World::new(Settings { gravity: DVec3::new(0.1, 0.0, -1.0) * size, ..paper(PaperSettings::default()) })
+                .unwrap();
+        let rod =
+            world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.03, 20, radius, material.clone())).unwrap();
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Jaw)).unwrap();
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: 0.01, half_length: 0.1 }, Pose::at(DVec3::Z * -0.02))).unwrap();
+        world
+            .insert_shape(&ShapeSpec::fixed(
+                Geometry::Cylinder { radius: 0.01, half_length: 0.1 },
+                Pose::at(DVec3::Z * -0.02),
+            ))
+            .unwrap();
         for _ in 0..20 {
             let report = world.step(DT);
             let view = world.rod(rod).unwrap();
@@ -265,19 +307,28 @@ fn absurd_numbers_leave_a_finite_state() {
     }
 }
 
-/// A ball that is driven into a thread pushes it along and does not pass, half an element a step. (At four elements a step it is pushed as well, but spheres that only the lengths pull at the ball
-/// sink into it, by a little more than their radius: contacts are sought before the iterations.)
+/// A ball that is driven into a thread pushes it along and does not pass, half an element a step. (At four elements a
+/// step it is pushed as well, but spheres that only the lengths pull at the ball sink into it, by a little more than
+/// their radius: contacts are sought before the iterations.)
 #[test]
 fn a_driven_shape_pushes() {
     let radius = 1e-3;
-    let settings = Settings { gravity: DVec3::ZERO, linear_damping: 0.9, ..paper(PaperSettings { friction: 0.0, ..PaperSettings::default() }) };
+    let settings = Settings {
+        gravity: DVec3::ZERO,
+        linear_damping: 0.9,
+        ..paper(PaperSettings { friction: 0.0, ..PaperSettings::default() })
+    };
     let mut world = World::new(settings).unwrap();
-    let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 50, radius, Material::elastic(1e8, 1150.0))).unwrap();
+    let rod = world
+        .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 50, radius, Material::elastic(1e8, 1150.0)))
+        .unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
     let ball = 5e-3;
     let at = |k: u32| Pose::at(DVec3::new(0.08, -0.02 + 1e-3 * f64::from(k), 0.0));
     let motion = ShapeMotion::Driven;
-    let shape = world.insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Sphere { radius: ball }, at(0)) }).unwrap();
+    let shape = world
+        .insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Sphere { radius: ball }, at(0)) })
+        .unwrap();
     let mut least = f64::INFINITY;
     let mut touched = 0;
     for k in 1..=48 {

@@ -4,14 +4,21 @@ mod support;
 
 use support::{quiet, settle, t1};
 use sutura::glam::DVec3;
-use sutura::{Drive, Error, Geometry, Grip, GripSpec, Handle, Hold, Place, Pose, Reel, ReelLaw, ReelSpec, Rod, RodSpec, Settings, ShapeSpec, Stretch, World};
+use sutura::{
+    Drive, Error, Geometry, Grip, GripSpec, Handle, Hold, Place, Pose, Reel, ReelLaw, ReelSpec, Rod, RodSpec, Settings,
+    ShapeSpec, Stretch, World,
+};
 
 /// A T1 thread of 50 mm that hangs from a reel at its start or its end.
 fn hanging(at_end: bool, law: ReelLaw, stretch: Stretch) -> (World, Handle<Rod>, Handle<Grip>, Handle<Reel>) {
     let (material, radius) = t1();
     let mut world = World::new(Settings::default()).unwrap();
     let (from, to) = (DVec3::ZERO, DVec3::NEG_Z * 0.05);
-    let line = if at_end { RodSpec::straight(to, from, 50, radius, material) } else { RodSpec::straight(from, to, 50, radius, material) };
+    let line = if at_end {
+        RodSpec::straight(to, from, 50, radius, material)
+    } else {
+        RodSpec::straight(from, to, 50, radius, material)
+    };
     let rod = world.insert_rod(&RodSpec { stretch, ..line }).unwrap();
     let place = if at_end { Place::End } else { Place::Start };
     let grip = world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
@@ -42,7 +49,8 @@ fn a_hanging_thread_is_let_down_and_drawn_up_at_the_rate_of_its_reel() {
             length += rate * time;
             let view = world.rod(rod).unwrap();
             assert!(
-                (view.rest_length() - length).abs() < 1e-9 && (world.reel_fed(reel).unwrap() - (length - 0.05)).abs() < 1e-9,
+                (view.rest_length() - length).abs() < 1e-9
+                    && (world.reel_fed(reel).unwrap() - (length - 0.05)).abs() < 1e-9,
                 "{rate} {} {} {length}",
                 view.rest_length(),
                 world.reel_fed(reel).unwrap()
@@ -54,7 +62,8 @@ fn a_hanging_thread_is_let_down_and_drawn_up_at_the_rate_of_its_reel() {
             let flux = 2.0 * view.mass_per_length(0) * rate * rate;
             assert!(excess.abs() < 2e-3 * weight + flux, "{at_end} {rate}: {excess} {weight}");
             // Elements stay of the length that they had.
-            let (least, most) = view.rest_lengths().iter().fold((1.0, 0.0), |(a, b): (f64, f64), l| (a.min(*l), b.max(*l)));
+            let (least, most) =
+                view.rest_lengths().iter().fold((1.0, 0.0), |(a, b): (f64, f64), l| (a.min(*l), b.max(*l)));
             let substep = rate.abs() / 240.0;
             assert!(least > 0.24e-3 && most < 1.61e-3 + substep, "{least} {most}");
         }
@@ -65,12 +74,14 @@ fn a_hanging_thread_is_let_down_and_drawn_up_at_the_rate_of_its_reel() {
 fn a_brake_gives_off_thread_at_its_tension_and_holds_below() {
     let (mut world, rod, _, reel) = hanging(true, ReelLaw::Brake(0.2), Stretch::Elastic);
     let pull = |force| Drive::Force { direction: DVec3::NEG_Z, force, speed_limit: 0.05 };
-    let grip = world.insert_grip(&GripSpec { drive: pull(0.15), ..GripSpec::at_once(rod, Place::Start, Hold::Pin) }).unwrap();
+    let grip =
+        world.insert_grip(&GripSpec { drive: pull(0.15), ..GripSpec::at_once(rod, Place::Start, Hold::Pin) }).unwrap();
     for _ in 0..120 {
         assert!(world.step(1.0 / 60.0).incidents.is_empty());
     }
     assert!(world.reel_fed(reel).unwrap().abs() < 1e-9, "{}", world.reel_fed(reel).unwrap());
-    // Pulled by 0.3 N it comes off at the speed at which the grip's force is what the brake holds (and the weight adds a little).
+    // Pulled by 0.3 N it comes off at the speed at which the grip's force is what the brake holds (and the weight adds
+    // a little).
     world.set_grip_drive(grip, pull(0.3)).unwrap();
     for _ in 0..60 {
         assert!(world.step(1.0 / 60.0).incidents.is_empty());
@@ -105,7 +116,8 @@ fn an_empty_reel_holds_and_a_short_thread_is_not_drawn_in() {
     let (material, radius) = t1();
     let mut world = World::new(Settings::default()).unwrap();
     let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.02, 20, radius, material)).unwrap();
-    let reel = world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.1), supply: Some(0.0123) }).unwrap();
+    let reel =
+        world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.1), supply: Some(0.0123) }).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
     for _ in 0..60 {
         assert!(world.step(1.0 / 60.0).incidents.is_empty());
@@ -118,12 +130,22 @@ fn an_empty_reel_holds_and_a_short_thread_is_not_drawn_in() {
 fn a_thread_let_down_onto_a_table_coils_and_what_holds_it_elsewhere_stays_in_place() {
     let (material, radius) = t1();
     let mut world = World::new(Settings { linear_damping: 0.9, ..Settings::default() }).unwrap();
-    let other = world.insert_rod(&RodSpec::straight(DVec3::ONE, DVec3::ONE + DVec3::X * 0.01, 5, radius, material.clone())).unwrap();
+    let other = world
+        .insert_rod(&RodSpec::straight(DVec3::ONE, DVec3::ONE + DVec3::X * 0.01, 5, radius, material.clone()))
+        .unwrap();
     world.insert_grip(&GripSpec::at_once(other, Place::Particle(3), Hold::Clamp)).unwrap();
     let rod = world
-        .insert_rod(&RodSpec::straight(DVec3::Z * 0.03, DVec3::new(1e-3, 2e-4, 1e-3), 29, radius, sutura::Material { bend_damping: 0.01, ..material }))
+        .insert_rod(&RodSpec::straight(
+            DVec3::Z * 0.03,
+            DVec3::new(1e-3, 2e-4, 1e-3),
+            29,
+            radius,
+            sutura::Material { bend_damping: 0.01, ..material },
+        ))
         .unwrap();
-    let after = world.insert_rod(&RodSpec::straight(DVec3::new(-1.0, 0.0, 1.0), DVec3::new(-1.01, 0.0, 1.0), 5, radius, t1().0)).unwrap();
+    let after = world
+        .insert_rod(&RodSpec::straight(DVec3::new(-1.0, 0.0, 1.0), DVec3::new(-1.01, 0.0, 1.0), 5, radius, t1().0))
+        .unwrap();
     let held = world.insert_grip(&GripSpec::at_once(after, Place::Particle(4), Hold::Clamp)).unwrap();
     world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY)).unwrap();
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
@@ -133,7 +155,11 @@ fn a_thread_let_down_onto_a_table_coils_and_what_holds_it_elsewhere_stays_in_pla
         let report = world.step_with(1.0 / 60.0, &mut |v| audit.observe(v));
         assert!(report.incidents.is_empty(), "{:?}", report.incidents);
     }
-    assert!(!audit.report().passes_through && audit.report().shape_clearance.unwrap() > -0.05, "{:?}", audit.report().shape_closest);
+    assert!(
+        !audit.report().passes_through && audit.report().shape_clearance.unwrap() > -0.05,
+        "{:?}",
+        audit.report().shape_closest
+    );
     assert!(audit.report().thread_clearance.is_none_or(|c| c > -0.05), "{:?}", audit.report().thread_closest);
     assert!(audit.report().max_elongation.iter().all(|e| e.1 < 1e-2), "{:?}", audit.report().max_elongation);
     let view = world.rod(rod).unwrap();
@@ -197,12 +223,15 @@ fn what_cannot_be_reeled_is_said() {
 
 #[test]
 fn a_snapshot_of_elements_all_alike_is_taken_up_with_all_joints() {
-    // Lengths and rates are powers of two: after eight substeps there is one element more, of the same length as all others.
+    // Lengths and rates are powers of two: after eight substeps there is one element more, of the same length as all
+    // others.
     for at_end in [false, true] {
         let build = || {
             let (material, radius) = t1();
             let mut world = World::new(Settings { substep: 1.0 / 256.0, ..Settings::default() }).unwrap();
-            let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (10.0 / 1024.0), 10, radius, material)).unwrap();
+            let rod = world
+                .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (10.0 / 1024.0), 10, radius, material))
+                .unwrap();
             let place = if at_end { Place::End } else { Place::Start };
             world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
             world.insert_reel(&ReelSpec { rod, at_end, law: ReelLaw::Rate(1.0 / 32.0), supply: None }).unwrap();
@@ -225,11 +254,18 @@ fn what_is_drawn_onto_the_reel_comes_off_again_and_the_snapshot_between_is_taken
         let (mut world, rod, _, reel) = hanging(at_end, ReelLaw::Rate(-0.05), Stretch::Elastic);
         // A mass 5 mm from the reel.
         let place = Place::Arc(if at_end { 0.045 } else { 0.005 });
-        world.insert_load(&sutura::LoadSpec { rod, kind: sutura::LoadKind::Mass { place, mass: 1e-3, inertia: DVec3::ZERO } }).unwrap();
+        world
+            .insert_load(&sutura::LoadSpec {
+                rod,
+                kind: sutura::LoadKind::Mass { place, mass: 1e-3, inertia: DVec3::ZERO },
+            })
+            .unwrap();
         let pulled = |world: &World| {
             let view = world.rod(rod).unwrap();
             // Where tension jumps by the weight, from the reel.
-            let tensions: Vec<f64> = (0..view.n_elements()).map(|e| view.tension(if at_end { view.n_elements() - 1 - e } else { e })).collect();
+            let tensions: Vec<f64> = (0..view.n_elements())
+                .map(|e| view.tension(if at_end { view.n_elements() - 1 - e } else { e }))
+                .collect();
             tensions.iter().position(|t| *t < 5e-3).unwrap()
         };
         world.step(0.2);

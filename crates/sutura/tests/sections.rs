@@ -6,7 +6,10 @@ use core::f64::consts::{FRAC_PI_4, PI, TAU};
 use support::{quiet, settle};
 use sutura::glam::{DQuat, DVec3};
 use sutura::math::frame_from_tangent;
-use sutura::{Along, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, Rod, RodSpec, Section, Settings, World};
+use sutura::{
+    Along, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, Rod, RodSpec,
+    Section, Settings, World,
+};
 
 const LENGTH: f64 = 0.05;
 const WIDTH: f64 = 1e-3;
@@ -36,7 +39,9 @@ fn deflection(n: usize, change: &dyn Fn(&mut RodSpec), force: DVec3) -> DVec3 {
     let mut world = World::new(quiet()).unwrap();
     let rod = insert(&mut world, n, change);
     world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
-    world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } })
+        .unwrap();
     settle(&mut world, 0.1, 1e-11, 60.0);
     tip(&world, rod) - DVec3::X * LENGTH
 }
@@ -59,8 +64,8 @@ fn strip() -> (f64, f64, f64) {
     (E * WIDTH * THICKNESS.powi(3) / 12.0, E * THICKNESS * WIDTH.powi(3) / 12.0, shear)
 }
 
-/// Tip load that deflects a cantilever of bending stiffness `ei` by a thousandth of its length: the closed forms are those of small
-/// deflections, and err by 1e-6.
+/// Tip load that deflects a cantilever of bending stiffness `ei` by a thousandth of its length: the closed forms are
+/// those of small deflections, and err by 1e-6.
 fn small_load(ei: f64) -> f64 {
     1e-3 * LENGTH * 3.0 * ei / LENGTH.powi(3)
 }
@@ -83,7 +88,8 @@ fn a_rolled_strip_deflects_obliquely() {
     for roll in [FRAC_PI_4, 0.3] {
         let (s, c) = roll.sin_cos();
         let k = LENGTH.powi(3) / 3.0;
-        let want = DVec3::new(0.0, p * k * s * c * (1.0 / ei2 - 1.0 / ei1), p * (k * (s * s / ei2 + c * c / ei1) + shear));
+        let want =
+            DVec3::new(0.0, p * k * s * c * (1.0 / ei2 - 1.0 / ei1), p * (k * (s * s / ei2 + c * c / ei1) + shear));
         let set = |spec: &mut RodSpec| (spec.section, spec.roll) = (STRIP, roll);
         second_order("along the load", 10, 5e-6, &|n| deflection(n, &set, DVec3::Z * p).z, want.z);
         second_order("across", 10, 5e-6, &|n| deflection(n, &set, DVec3::Z * p).y, want.y);
@@ -97,7 +103,8 @@ fn a_pretwisted_strip_rests_without_moment_and_bends_by_its_mean_compliance() {
     let (mean, half_difference) = (0.5 * (1.0 / ei1 + 1.0 / ei2), 0.5 * (1.0 / ei1 - 1.0 / ei2));
     for pretwist in [5.0, -3.0 * TAU] {
         let set = |spec: &mut RodSpec| (spec.section, spec.pretwist) = (STRIP, pretwist);
-        // The compliance at s is mean + half difference * (cos, -sin)(k s) along and across, k = 2 pretwist / L; its integral with (L - s)^2.
+        // The compliance at s is mean + half difference * (cos, -sin)(k s) along and across, k = 2 pretwist / L; its
+        // integral with (L - s)^2.
         let k = 2.0 * pretwist / LENGTH;
         let along = 2.0 * LENGTH / (k * k) - 2.0 * (k * LENGTH).sin() / k.powi(3);
         let across = LENGTH * LENGTH / k - 2.0 * (1.0 - (k * LENGTH).cos()) / k.powi(3);
@@ -133,11 +140,23 @@ fn a_cone_and_a_rod_of_growing_modulus_bend_as_their_integrals_say() {
     let p = small_load(ei);
     // Integral of (1 - x)^2 / (1 - x / 2)^4 is 2/3, of (1 - x / 2)^-2 is 2.
     let cone = |s: &mut RodSpec| s.along.size = Profile(vec![(0.0, 1.0), (LENGTH, 0.5)]);
-    second_order("cone", 20, 1e-5, &|n| deflection(n, &cone, DVec3::Z * p).z, p * (LENGTH.powi(3) / ei * (2.0 / 3.0) + 2.0 * shear));
+    second_order(
+        "cone",
+        20,
+        1e-5,
+        &|n| deflection(n, &cone, DVec3::Z * p).z,
+        p * (LENGTH.powi(3) / ei * (2.0 / 3.0) + 2.0 * shear),
+    );
     // Integral of (1 - x)^2 / (1 + x) is 4 ln 2 - 5/2, of 1 / (1 + x) is ln 2.
     let ln2 = core::f64::consts::LN_2;
     let stiffer = |s: &mut RodSpec| s.along.modulus = Profile(vec![(0.0, 1.0), (LENGTH, 2.0)]);
-    second_order("modulus", 20, 1e-5, &|n| deflection(n, &stiffer, DVec3::Z * p).z, p * (LENGTH.powi(3) / ei * (4.0 * ln2 - 2.5) + ln2 * shear));
+    second_order(
+        "modulus",
+        20,
+        1e-5,
+        &|n| deflection(n, &stiffer, DVec3::Z * p).z,
+        p * (LENGTH.powi(3) / ei * (4.0 * ln2 - 2.5) + ln2 * shear),
+    );
 }
 
 /// Torque that turns one end against the other by `angle`.
@@ -170,8 +189,8 @@ fn torsion_of_an_ellipse_a_rectangle_and_a_cone() {
 
 #[test]
 fn a_deep_strip_buckles_sideways() {
-    // Cantilever under a tip load at the centroid: P = 4.013 sqrt(EI GJ) / L^2 with the EI of the limp way (Timoshenko and Gere, section 6.3),
-    // for a strip whose other EI is much larger: here 100 times.
+    // Cantilever under a tip load at the centroid: P = 4.013 sqrt(EI GJ) / L^2 with the EI of the limp way (Timoshenko
+    // and Gere, section 6.3), for a strip whose other EI is much larger: here 100 times.
     let (w, t) = (2e-3, 0.2e-3);
     let ei = E * w * t * t * t / 12.0;
     let gj = E / (2.0 * (1.0 + NU)) * 0.312 * w * t * t * t;
@@ -181,7 +200,11 @@ fn a_deep_strip_buckles_sideways() {
         let rod = insert(&mut world, 40, &|s| s.section = Section::Rectangle([t, w]));
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
         // A nudge, so that it need not wait for rounding errors.
-        let at = |part: f64| LoadKind::Point { place: Place::End, force: DVec3::new(0.0, 1e-5, -1.0) * (load * critical * part), torque: DVec3::ZERO };
+        let at = |part: f64| LoadKind::Point {
+            place: Place::End,
+            force: DVec3::new(0.0, 1e-5, -1.0) * (load * critical * part),
+            torque: DVec3::ZERO,
+        };
         let load = world.insert_load(&LoadSpec { rod, kind: at(0.0) }).unwrap();
         for i in 1..=20 {
             world.set_load(load, at(f64::from(i) / 20.0)).unwrap();
@@ -199,8 +222,8 @@ fn a_deep_strip_buckles_sideways() {
 
 #[test]
 fn density_along_the_thread_weighs() {
-    // Factor 1 + 2 x: weight 2, moment about the start 7/6 of the uniform one's weight and length. Stiff, so that it hardly
-    // sags, yet not so stiff that the force is lost in the rounding of positions.
+    // Factor 1 + 2 x: weight 2, moment about the start 7/6 of the uniform one's weight and length. Stiff, so that it
+    // hardly sags, yet not so stiff that the force is lost in the rounding of positions.
     let g = 9.81;
     let change = |s: &mut RodSpec| {
         s.section = STRIP;
@@ -220,13 +243,17 @@ fn density_along_the_thread_weighs() {
     second_order("moment", 10, 1e-6, &|n| held(n).torque.y, -weight * LENGTH * 7.0 / 6.0);
 }
 
-/// Lowest w^2 of a cantilever of unit length and stiffness with mass `1 + growth x`, by Rayleigh and Ritz in x^2 .. x^7.
+/// Lowest w^2 of a cantilever of unit length and stiffness with mass `1 + growth x`, by Rayleigh and Ritz in x^2 ..
+/// x^7.
 fn lowest(growth: f64) -> f64 {
     const N: usize = 6;
     let power = |i: usize| (i + 2) as f64;
-    let stiffness = |i: usize, j: usize| power(i) * (power(i) - 1.0) * power(j) * (power(j) - 1.0) / (power(i) + power(j) - 3.0);
+    let stiffness =
+        |i: usize, j: usize| power(i) * (power(i) - 1.0) * power(j) * (power(j) - 1.0) / (power(i) + power(j) - 3.0);
     let mass = |i: usize, j: usize| 1.0 / (power(i) + power(j) + 1.0) + growth / (power(i) + power(j) + 2.0);
-    let times = |a: &dyn Fn(usize, usize) -> f64, v: &[f64; N]| -> [f64; N] { core::array::from_fn(|i| (0..N).map(|j| a(i, j) * v[j]).sum()) };
+    let times = |a: &dyn Fn(usize, usize) -> f64, v: &[f64; N]| -> [f64; N] {
+        core::array::from_fn(|i| (0..N).map(|j| a(i, j) * v[j]).sum())
+    };
     let dot = |a: &[f64; N], b: &[f64; N]| -> f64 { a.iter().zip(b).map(|(x, y)| x * y).sum() };
     let mut v = [1.0; N];
     let mut value = 0.0;
@@ -269,7 +296,9 @@ fn the_frequency_of_a_cantilever_whose_density_grows() {
         });
         world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
         let force = DVec3::Z * small_load(ei);
-        let load = world.insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } }).unwrap();
+        let load = world
+            .insert_load(&LoadSpec { rod, kind: LoadKind::Point { place: Place::End, force, torque: DVec3::ZERO } })
+            .unwrap();
         for _ in 0..100 {
             world.step(50.0 * h);
         }
@@ -294,7 +323,9 @@ fn the_frequency_of_a_cantilever_whose_density_grows() {
 #[test]
 fn contact_takes_the_largest_radius_and_plastic_set_wants_a_section_without_preference() {
     let mut world = World::new(quiet()).unwrap();
-    let rod = insert(&mut world, 10, &|s| s.along = Along { size: Profile(vec![(0.0, 0.5), (0.01, 1.5), (LENGTH, 1.0)]), ..Along::default() });
+    let rod = insert(&mut world, 10, &|s| {
+        s.along = Along { size: Profile(vec![(0.0, 0.5), (0.01, 1.5), (LENGTH, 1.0)]), ..Along::default() }
+    });
     assert_eq!(world.rod(rod).unwrap().radius(), 0.2e-3 * 1.5);
     let mut flat = spec(10);
     flat.section = STRIP;

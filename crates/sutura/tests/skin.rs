@@ -1,4 +1,5 @@
-//! The skin of threads and the meshes of shapes: closed, outward, of the right size, and true to the thread that they follow.
+//! The skin of threads and the meshes of shapes: closed, outward, of the right size, and true to the thread that they
+//! follow.
 
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
@@ -12,7 +13,8 @@ fn vector(x: [f32; 3]) -> DVec3 {
     Vec3::from(x).as_dvec3()
 }
 
-/// Euler characteristic of the surface, vertices at one place taken as one; fails where an edge does not have one triangle on each side.
+/// Euler characteristic of the surface, vertices at one place taken as one; fails where an edge does not have one
+/// triangle on each side.
 fn euler(mesh: &TriangleMesh, positions: &[[f32; 3]]) -> i64 {
     // Vertices that are meant to be one are nearer than a thousandth of a radius, others farther apart.
     let mut one: Vec<usize> = Vec::new();
@@ -79,7 +81,8 @@ fn rows(skin: &Skin, posed: &Posed, rings: usize) -> Vec<(DVec3, Vec<DVec3>)> {
     posed.positions.chunks(13).skip(caps).take(n_rows).map(row).collect()
 }
 
-/// Smallest and largest distance of vertices from the centerline, across it, over the radius; without a few rows at the ends.
+/// Smallest and largest distance of vertices from the centerline, across it, over the radius; without a few rows at the
+/// ends.
 fn thickness(rows: &[(DVec3, Vec<DVec3>)], leave_out: usize) -> (f64, f64) {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
     for i in leave_out..rows.len() - leave_out {
@@ -176,7 +179,8 @@ fn a_bend_of_one_diameter_keeps_its_radius_by_the_law_of_linear_blending() {
 
 #[test]
 fn the_coarse_elements_of_a_tight_knot_keep_their_radius() {
-    // Elements of two diameters that turn by 70 and by 82 degrees, as in the scene `square_knot` when it is tied, and while it is drawn.
+    // Elements of two diameters that turn by 70 and by 82 degrees, as in the scene `square_knot` when it is tied, and
+    // while it is drawn.
     for (turn, bound) in [(70.0f64, 0.11), (82.0, 0.16)] {
         let (x, q, lengths) = arc(16, 2.0, 1.0 / (0.5 * turn.to_radians()).sin());
         let skin = Skin::new(&SkinSpec::new(lengths, R)).unwrap();
@@ -188,7 +192,8 @@ fn the_coarse_elements_of_a_tight_knot_keep_their_radius() {
 
 #[test]
 fn a_bend_has_no_edges() {
-    // Turn of the line of centers from one row to the next where 60 degrees lie between elements, rows being a 16th of an element apart.
+    // Turn of the line of centers from one row to the next where 60 degrees lie between elements, rows being a 16th of
+    // an element apart.
     let (x, q, lengths) = arc(12, 1.0, 1.0);
     let skin = Skin::new(&SkinSpec { rings: 16, ..SkinSpec::new(lengths, R) }).unwrap();
     let rows = rows(&skin, &pose(&skin, &x, &q), 16);
@@ -201,10 +206,22 @@ fn a_bend_has_no_edges() {
 /// What a graphics processor does with joints, weights and inverse bind matrices.
 #[test]
 fn posing_is_linear_blending_of_each_vertex() {
-    for (blend, seam) in [(Blend::Smooth, None), (Blend::InverseDistance, None), (Blend::Smooth, Some(0.4)), (Blend::InverseDistance, Some(0.4))] {
+    for (blend, seam) in [
+        (Blend::Smooth, None),
+        (Blend::InverseDistance, None),
+        (Blend::Smooth, Some(0.4)),
+        (Blend::InverseDistance, Some(0.4)),
+    ] {
         let (x, q, lengths) = arc(8, 1.0, 2.0);
         let size = Profile(vec![(0.0, 1.0), (1e-3, 0.5)]);
-        let skin = Skin::new(&SkinSpec { blend, seam, size, section: Section::Ellipse([R, 0.6 * R]), ..SkinSpec::new(lengths, R) }).unwrap();
+        let skin = Skin::new(&SkinSpec {
+            blend,
+            seam,
+            size,
+            section: Section::Ellipse([R, 0.6 * R]),
+            ..SkinSpec::new(lengths, R)
+        })
+        .unwrap();
         let mut bones = vec![Bone::default(); skin.n_bones()];
         skin.bones_at(&x, &q, &mut bones);
         let matrices: Vec<Mat4> = bones
@@ -281,7 +298,9 @@ fn twist_of_the_frames_turns_the_skin() {
 
 #[test]
 fn a_closed_thread_has_no_ends_and_no_seam() {
-    for (twist, blend) in [(0.0, Blend::Smooth), (TAU * 1.25, Blend::Smooth), (1.0, Blend::Smooth), (TAU * 1.25, Blend::InverseDistance)] {
+    for (twist, blend) in
+        [(0.0, Blend::Smooth), (TAU * 1.25, Blend::Smooth), (1.0, Blend::Smooth), (TAU * 1.25, Blend::InverseDistance)]
+    {
         let ring = RodSpec::ring(DVec3::ZERO, DVec3::Z, DVec3::X * 2e-3, 30, R, Material::elastic(1e9, 1150.0));
         let mut world = World::new(Settings::default()).unwrap();
         let rod = world.insert_rod(&RodSpec { closure: Some(Closure { twist }), ..ring }).unwrap();
@@ -298,7 +317,8 @@ fn a_closed_thread_has_no_ends_and_no_seam() {
         };
         let turns: Vec<f64> = (1..rows.len()).map(|i| (angle(i) - angle(i - 1) + PI).rem_euclid(TAU) - PI).collect();
         let most = turns.iter().map(|t| t.abs()).fold(0.0, f64::max);
-        // A turn that is no whole number of sides is rounded: at most half of one of twelve sides is made up for at the seam, over eight rows.
+        // A turn that is no whole number of sides is rounded: at most half of one of twelve sides is made up for at the
+        // seam, over eight rows.
         assert!(most < 3.0 * twist.abs() / 120.0 + PI / 12.0, "twist {twist}, {blend:?}: {most} a row");
         let whole = skin.mesh().uvs.last().unwrap()[1];
         assert!((whole - whole.round()).abs() < 1e-4 && whole >= 1.0, "texture along: {whole}");
@@ -323,7 +343,9 @@ fn sections_and_sizes_are_those_of_the_thread() {
     let exact = 4e-3 * (a0 + a1 + (a0 * a1).sqrt()) / 3.0;
     assert!((volume(skin.mesh(), &posed.positions) / exact - 1.0).abs() < 1e-4);
 
-    let ellipse = Skin::new(&SkinSpec { section: Section::Ellipse([2.0 * R, R]), sides: 48, ..SkinSpec::new(vec![1e-3], R) }).unwrap();
+    let ellipse =
+        Skin::new(&SkinSpec { section: Section::Ellipse([2.0 * R, R]), sides: 48, ..SkinSpec::new(vec![1e-3], R) })
+            .unwrap();
     let mesh = ellipse.mesh();
     assert_eq!(euler(mesh, &mesh.positions), 2);
     looks_outward(mesh, &mesh.positions, &mesh.normals, 0.8);

@@ -8,8 +8,8 @@ use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::knot::writhe;
 use sutura::{
-    Closure, Drive, Friction, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Place, Pose, RestShape, Rod, RodSpec, Settings, ShapeSpec, Stretch,
-    WeldSpec, World,
+    Closure, Drive, Friction, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Place, Pose, RestShape, Rod,
+    RodSpec, Settings, ShapeSpec, Stretch, WeldSpec, World,
 };
 
 const R: f64 = 0.02;
@@ -43,7 +43,11 @@ fn a_ring_of_straight_thread_is_a_circle_with_the_energy_of_one() {
     assert!((view.energy().total() / want - 1.0).abs() < 1e-6, "{:e} {want:e}", view.energy().total());
     // The seam is a joint as any other: all bend alike, and all points lie on one circle.
     for joint in 0..60 {
-        assert!((view.strain(joint).length() * l / TAU - 1.0).abs() < 1e-6, "{joint}: {}", view.strain(joint).length() * l / TAU);
+        assert!(
+            (view.strain(joint).length() * l / TAU - 1.0).abs() < 1e-6,
+            "{joint}: {}",
+            view.strain(joint).length() * l / TAU
+        );
         assert!((view.moment(joint).length() * l / (TAU * ei) - 1.0).abs() < 1e-6);
     }
     let center: DVec3 = view.positions()[..60].iter().sum::<DVec3>() / 60.0;
@@ -53,7 +57,8 @@ fn a_ring_of_straight_thread_is_a_circle_with_the_energy_of_one() {
 
 #[test]
 fn a_ring_pulled_apart_opens_by_the_formula_wherever_its_seam_is() {
-    // A ring whose rest shape is the circle, F across a diameter: it opens by (pi / 4 - 2 / pi) F R^3 / EI and closes across by 0.136620 of it.
+    // A ring whose rest shape is the circle, F across a diameter: it opens by (pi / 4 - 2 / pi) F R^3 / EI and closes
+    // across by 0.136620 of it.
     let n = 96;
     let force = 2e-5;
     let mut found = Vec::new();
@@ -82,8 +87,8 @@ fn a_ring_pulled_apart_opens_by_the_formula_wherever_its_seam_is() {
 
 #[test]
 fn michell() {
-    // A straight thread closed to a ring with twist put in stays a circle up to 2 pi sqrt(3) EI / GJ, beyond it leaves its plane
-    // (Michell 1889). A ring of n links with joints as these leaves it at 1.4 / n^2 less.
+    // A straight thread closed to a ring with twist put in stays a circle up to 2 pi sqrt(3) EI / GJ, beyond it leaves
+    // its plane (Michell 1889). A ring of n links with joints as these leaves it at 1.4 / n^2 less.
     // EI / GJ = 1 + nu = 1.4.
     let n = 60;
     for (part, stays) in [(0.99, true), (1.01, false)] {
@@ -122,19 +127,26 @@ fn a_splice_is_one_thread() {
     let mut tips = Vec::new();
     for kind in 0..3 {
         let mut world = World::new(Settings { gravity: DVec3::NEG_Z * 9.81, tolerance: 1e-6, ..quiet() }).unwrap();
-        let piece = |from: f64, to: f64, n| RodSpec::straight(DVec3::X * from, DVec3::X * to, n, radius, material.clone());
+        let piece =
+            |from: f64, to: f64, n| RodSpec::straight(DVec3::X * from, DVec3::X * to, n, radius, material.clone());
         let (first, last) = match kind {
             0 => {
                 let rod = world.insert_rod(&piece(0.0, 0.1, 40)).unwrap();
                 (rod, (rod, Place::End))
             }
             1 => {
-                let (a, b) = (world.insert_rod(&piece(0.0, 0.05, 20)).unwrap(), world.insert_rod(&piece(0.05, 0.1, 20)).unwrap());
+                let (a, b) = (
+                    world.insert_rod(&piece(0.0, 0.05, 20)).unwrap(),
+                    world.insert_rod(&piece(0.05, 0.1, 20)).unwrap(),
+                );
                 world.insert_weld(&WeldSpec::splice((a, Place::End), (b, Place::Start))).unwrap();
                 (a, (b, Place::End))
             }
             _ => {
-                let (b, a) = (world.insert_rod(&piece(0.1, 0.05, 20)).unwrap(), world.insert_rod(&piece(0.0, 0.05, 20)).unwrap());
+                let (b, a) = (
+                    world.insert_rod(&piece(0.1, 0.05, 20)).unwrap(),
+                    world.insert_rod(&piece(0.0, 0.05, 20)).unwrap(),
+                );
                 world.insert_weld(&WeldSpec::splice((a, Place::End), (b, Place::End))).unwrap();
                 (a, (b, Place::Start))
             }
@@ -154,16 +166,18 @@ fn a_splice_is_one_thread() {
 
 #[test]
 fn a_branch_carries_what_hangs_on_it_and_turns_what_it_grows_from() {
-    // A torsion bar held at both ends, an arm across from its middle with a weight at the end: the arm turns with the bar by
-    // T (L / 2) / 2 GJ, and the weight is carried by both clamps.
+    // A torsion bar held at both ends, an arm across from its middle with a weight at the end: the arm turns with the
+    // bar by T (L / 2) / 2 GJ, and the weight is carried by both clamps.
     let (material, radius) = t1();
     let (length, arm, force) = (0.04, 0.01, 2e-5);
     let mut world = World::new(Settings { tolerance: 1e-6, ..quiet() }).unwrap();
-    let bar = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * length, 80, radius, material.clone())).unwrap();
+    let bar =
+        world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * length, 80, radius, material.clone())).unwrap();
     let middle = DVec3::X * (0.5 * length);
     let branch = world.insert_rod(&RodSpec::straight(middle, middle + DVec3::Y * arm, 40, radius, material)).unwrap();
     let weld = world.insert_weld(&WeldSpec::new(vec![(bar, Place::Particle(40)), (branch, Place::Start)])).unwrap();
-    let grips = [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(bar, place, Hold::Clamp)).unwrap());
+    let grips =
+        [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(bar, place, Hold::Clamp)).unwrap());
     pull(&mut world, branch, Place::End, DVec3::NEG_Z * force);
     settle(&mut world, 0.05, 1e-9, 100.0);
     let (gj, ei) = (world.rod(bar).unwrap().bending_stiffness(0).z, world.rod(bar).unwrap().bending_stiffness(0).x);
@@ -195,7 +209,8 @@ fn a_branch_carries_what_hangs_on_it_and_turns_what_it_grows_from() {
 
 #[test]
 fn a_weld_is_held_pinned_clamped_guided_and_by_a_jaw() {
-    let (mut world, rod) = world(Settings { gravity: DVec3::NEG_Z * 9.81, linear_damping: 0.9, ..Settings::default() }, &ring(40));
+    let (mut world, rod) =
+        world(Settings { gravity: DVec3::NEG_Z * 9.81, linear_damping: 0.9, ..Settings::default() }, &ring(40));
     let weight = world.rod(rod).unwrap().mass_per_length(0) * world.rod(rod).unwrap().rest_length() * 9.81;
     let seam = world.weld_at(rod, 0).unwrap().unwrap();
     assert_eq!(world.weld_at(rod, 40).unwrap(), Some(seam));
@@ -218,7 +233,8 @@ fn a_weld_is_held_pinned_clamped_guided_and_by_a_jaw() {
         world.set_grip_pose(grip, Pose::new(to, pose.orientation)).unwrap();
         world.step(0.5);
         let view = world.rod(rod).unwrap();
-        let at = if hold == Hold::Jaw { (view.positions()[0] + view.positions()[1]) * 0.5 } else { view.positions()[0] };
+        let at =
+            if hold == Hold::Jaw { (view.positions()[0] + view.positions()[1]) * 0.5 } else { view.positions()[0] };
         assert!((at - to).length() < 1e-12 && view.positions()[40] == view.positions()[0], "{hold:?}");
         world.remove_grip(grip).unwrap();
     }
@@ -239,11 +255,15 @@ fn a_ring_on_a_post_bears_where_its_seam_is_and_the_audit_agrees() {
     // A ring of 8 mm hung over a post of 2 mm, with the seam on top of the post, and elsewhere.
     let (material, radius) = t1();
     for seam in [0.0, 1.0, PI] {
-        let mut world = World::new(Settings { friction: Friction::coulomb(0.3), linear_damping: 0.99, ..Settings::default() }).unwrap();
+        let mut world =
+            World::new(Settings { friction: Friction::coulomb(0.3), linear_damping: 0.99, ..Settings::default() })
+                .unwrap();
         let start = DQuat::from_rotation_x(seam) * DVec3::Z * 8e-3;
         let rod = world.insert_rod(&RodSpec::ring(DVec3::ZERO, DVec3::X, start, 60, radius, material.clone())).unwrap();
         let pose = Pose::new(DVec3::Z * (8e-3 - 2e-3 - 1.05 * radius), DQuat::from_rotation_y(0.5 * PI));
-        let post = world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: 2e-3, half_length: 0.02 }, pose)).unwrap();
+        let post = world
+            .insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: 2e-3, half_length: 0.02 }, pose))
+            .unwrap();
         let mut audit = Audit::new();
         for _ in 0..240 {
             let report = world.step_with(1.0 / 60.0, &mut |v| audit.observe(v));
@@ -264,7 +284,9 @@ fn linked_rings_stay_linked_and_hang_on_each_other() {
     let size = 5e-3;
     let mut world = World::new(Settings { linear_damping: 0.99, ..Settings::default() }).unwrap();
     let material = sutura::Material { bend_damping: 0.01, ..material };
-    let upper = world.insert_rod(&RodSpec::ring(DVec3::ZERO, DVec3::X, DVec3::NEG_Z * size, 60, radius, material.clone())).unwrap();
+    let upper = world
+        .insert_rod(&RodSpec::ring(DVec3::ZERO, DVec3::X, DVec3::NEG_Z * size, 60, radius, material.clone()))
+        .unwrap();
     let below = DVec3::NEG_Z * (2.0 * size - 3.0 * radius);
     let lower = world.insert_rod(&RodSpec::ring(below, DVec3::Y, DVec3::Z * size, 60, radius, material)).unwrap();
     let grip = world.insert_grip(&GripSpec::at_once(upper, Place::Particle(30), Hold::Clamp)).unwrap();
@@ -277,7 +299,11 @@ fn linked_rings_stay_linked_and_hang_on_each_other() {
     let (a, b) = (world.rod(upper).unwrap(), world.rod(lower).unwrap());
     let linking = sutura::knot::gauss_linking(a.positions(), b.positions());
     assert!((linking.abs() - 1.0).abs() < 1e-9, "{linking}");
-    assert!(!audit.report().passes_through && audit.report().thread_clearance.unwrap() > -0.05, "{:?}", audit.report().thread_clearance);
+    assert!(
+        !audit.report().passes_through && audit.report().thread_clearance.unwrap() > -0.05,
+        "{:?}",
+        audit.report().thread_clearance
+    );
     let weight = [a, b].iter().map(|r| r.mass_per_length(0) * r.rest_length() * 9.81).sum::<f64>() + 0.01;
     assert!((world.grip_wrench(grip).unwrap().force.z / weight - 1.0).abs() < 0.01);
     let contact: f64 = world.contacts().map(|c| c.force.z.abs()).sum();
@@ -305,9 +331,13 @@ fn a_snapshot_holds_welds_and_dropping_scratch_changes_no_bit() {
         let (material, radius) = t1();
         let mut world = World::new(Settings::default()).unwrap();
         let ring = world.insert_rod(&ring(30)).unwrap();
-        let tail = world.insert_rod(&RodSpec::straight(DVec3::X * R, DVec3::X * 2.0 * R, 20, radius, material)).unwrap();
+        let tail =
+            world.insert_rod(&RodSpec::straight(DVec3::X * R, DVec3::X * 2.0 * R, 20, radius, material)).unwrap();
         let ring_at = Place::Particle(0);
-        assert!(world.insert_weld(&WeldSpec::new(vec![(ring, ring_at), (tail, Place::Start)])).is_err(), "the seam is a weld already");
+        assert!(
+            world.insert_weld(&WeldSpec::new(vec![(ring, ring_at), (tail, Place::Start)])).is_err(),
+            "the seam is a weld already"
+        );
         let from = world.rod(ring).unwrap().positions()[15];
         let other = world.insert_rod(&RodSpec::straight(from, from - DVec3::X * R, 20, radius, t1().0)).unwrap();
         world.insert_weld(&WeldSpec::new(vec![(other, Place::Start), (ring, Place::Particle(15))])).unwrap();
@@ -329,20 +359,31 @@ fn a_snapshot_holds_welds_and_dropping_scratch_changes_no_bit() {
 
 #[test]
 fn what_a_clamp_holds_stays_as_it_is_when_something_is_welded_to_it_and_when_it_comes_off() {
-    // A thread that its weight bends, held by a clamp at its start or its middle; another one, hanging straight down, is welded on there.
+    // A thread that its weight bends, held by a clamp at its start or its middle; another one, hanging straight down,
+    // is welded on there.
     for (place, particle) in [(Place::Start, 0), (Place::Particle(10), 10)] {
         let (material, radius) = t1();
         let mut world = World::new(Settings { linear_damping: 0.99, ..Settings::default() }).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
+        let rod =
+            world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
         world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
         settle(&mut world, 0.05, 1e-6, 60.0);
         let shape = world.rod(rod).unwrap().positions().to_vec();
         let moved = |world: &World, shape: &[DVec3]| {
-            let x = world.rod(rod).unwrap().positions().iter().zip(shape).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+            let x = world
+                .rod(rod)
+                .unwrap()
+                .positions()
+                .iter()
+                .zip(shape)
+                .map(|(a, b)| (*a - *b).length())
+                .fold(0.0, f64::max);
             x / 0.1
         };
         assert!(shape[20].z < -5e-4);
-        let branch = world.insert_rod(&RodSpec::straight(shape[particle], shape[particle] - DVec3::Z * 0.02, 8, radius, material)).unwrap();
+        let branch = world
+            .insert_rod(&RodSpec::straight(shape[particle], shape[particle] - DVec3::Z * 0.02, 8, radius, material))
+            .unwrap();
         let weld = world.insert_weld(&WeldSpec::new(vec![(rod, place), (branch, Place::Start)])).unwrap();
         settle(&mut world, 0.05, 1e-6, 60.0);
         assert!(moved(&world, &shape) < 1e-6, "{place:?}: {}", moved(&world, &shape));
@@ -356,7 +397,8 @@ fn what_a_clamp_holds_stays_as_it_is_when_something_is_welded_to_it_and_when_it_
     for removed in [false, true] {
         let (material, radius) = t1();
         let mut world = World::new(quiet()).unwrap();
-        let rod = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
+        let rod =
+            world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * 0.1, 20, radius, material.clone())).unwrap();
         let branch = world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::Y * 0.02, 8, radius, material)).unwrap();
         let weld = world.insert_weld(&WeldSpec::new(vec![(rod, Place::Start), (branch, Place::Start)])).unwrap();
         world.insert_grip(&GripSpec::at_once(branch, Place::Start, Hold::Clamp)).unwrap();
@@ -374,14 +416,19 @@ fn what_a_clamp_holds_stays_as_it_is_when_something_is_welded_to_it_and_when_it_
 
 #[test]
 fn threads_that_cross_at_a_weld_are_both_at_rest_there() {
-    // Straight threads whose middles are joined at any angle stay straight, and the same in a bent one whose rest shape is an arc.
+    // Straight threads whose middles are joined at any angle stay straight, and the same in a bent one whose rest shape
+    // is an arc.
     for angle in [0.4, 1.5] {
         let (material, radius) = t1();
         let mut world = World::new(quiet()).unwrap();
         let turn = DQuat::from_rotation_z(angle);
-        let a = world.insert_rod(&RodSpec::straight(DVec3::NEG_X * 0.02, DVec3::X * 0.02, 20, radius, material.clone())).unwrap();
-        let bow: Vec<DVec3> = (-10..=10).map(|i| turn * DVec3::new(2e-3 * f64::from(i), 2e-5 * f64::from(i * i), 0.0)).collect();
-        let b = world.insert_rod(&RodSpec { rest: RestShape::AsInserted, ..RodSpec::new(bow, radius, material) }).unwrap();
+        let a = world
+            .insert_rod(&RodSpec::straight(DVec3::NEG_X * 0.02, DVec3::X * 0.02, 20, radius, material.clone()))
+            .unwrap();
+        let bow: Vec<DVec3> =
+            (-10..=10).map(|i| turn * DVec3::new(2e-3 * f64::from(i), 2e-5 * f64::from(i * i), 0.0)).collect();
+        let b =
+            world.insert_rod(&RodSpec { rest: RestShape::AsInserted, ..RodSpec::new(bow, radius, material) }).unwrap();
         world.insert_weld(&WeldSpec::new(vec![(a, Place::Particle(10)), (b, Place::Particle(10))])).unwrap();
         let before: Vec<DVec3> = world.view().rods().flat_map(|r| r.positions().to_vec()).collect();
         world.step(1.0);

@@ -4,7 +4,10 @@ use std::f64::consts::TAU;
 use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeSpec, World};
+use sutura::{
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, ShapeSpec,
+    World,
+};
 
 const DT: f64 = 1.0 / 60.0;
 const POST: f64 = 2.5e-3;
@@ -23,7 +26,12 @@ struct Wound {
 
 impl Wound {
     fn new(turns: f64, mu: f64, record: bool) -> Self {
-        let settings = Settings { friction: Friction::coulomb(mu), gravity: DVec3::ZERO, linear_damping: 0.9, ..Settings::default() };
+        let settings = Settings {
+            friction: Friction::coulomb(mu),
+            gravity: DVec3::ZERO,
+            linear_damping: 0.9,
+            ..Settings::default()
+        };
         let mut world = Recorder::new(settings, record).unwrap();
         let (around, tail, element) = (POST + 1.05 * RADIUS, 30e-3, 0.3e-3);
         let arc = TAU * turns * around;
@@ -38,7 +46,9 @@ impl Wound {
         let points = (0..=n).map(|i| at((arc + 2.0 * tail) * i as f64 / n as f64)).collect();
         let material = Material { bend_scale: 0.02, bend_damping: 2e-3, ..Material::elastic(8.7e9, 1300.0) };
         let rod = world.insert_rod(&RodSpec::new(points, RADIUS, material)).unwrap();
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: 20e-3 }, Pose::IDENTITY)).unwrap();
+        world
+            .insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: POST, half_length: 20e-3 }, Pose::IDENTITY))
+            .unwrap();
         let drive = Drive::Force { direction: DVec3::NEG_Y, force: PULL, speed_limit: 0.2 };
         let start = world.insert_grip(&GripSpec { drive, ..GripSpec::at_once(rod, Place::Start, Hold::Pin) }).unwrap();
         let end = world.insert_grip(&GripSpec::at_once(rod, Place::End, Hold::Pin)).unwrap();

@@ -10,14 +10,16 @@ use std::time::Duration;
 /// Scenes that the whole check leaves out, and why. `cargo xtask scenes` runs them all.
 const LEFT_OUT: &[(&str, &str)] = &[];
 
-/// The longest that a scene may take \[s\]: many times what the slowest takes on a slow machine; a scene that hangs is stopped.
+/// The longest that a scene may take \[s\]: many times what the slowest takes on a slow machine; a scene that hangs is
+/// stopped.
 const LONGEST: Duration = Duration::from_secs(300);
 
-/// How long each fuzz target is tried \[s\], beyond its corpus, which the tests replay. `cargo xtask fuzz` takes longer.
+/// How long each fuzz target is tried \[s\], beyond its corpus, which the tests replay. `cargo xtask fuzz` takes
+/// longer.
 const FUZZING: f64 = 20.0;
 
-/// Scenes that the debug build runs whole, with their motions, conditions and audit: a free thread, and one in contact with a shape. Of all
-/// others it does again what the release build recorded.
+/// Scenes that the debug build runs whole, with their motions, conditions and audit: a free thread, and one in contact
+/// with a shape. Of all others it does again what the release build recorded.
 const RUN_AGAIN: &[&str] = &["hanging_helix", "capstan"];
 
 /// Everything.
@@ -25,8 +27,8 @@ pub fn everything(tally: &mut Tally) {
     tally.run("format", &mut cargo(&["fmt", "--check", "--all"]));
     tally.run("lints", &mut cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"]));
     tests(tally, &[]);
-    // The programs have nothing to document beyond their own help. Steps select the whole workspace where they can: a part of it
-    // would choose other features of the dependencies and build them again.
+    // The programs have nothing to document beyond their own help. Steps select the whole workspace where they can: a
+    // part of it would choose other features of the dependencies and build them again.
     let mut doc = cargo(&["doc", "--workspace", "--lib", "--no-deps"]);
     tally.run("documentation", doc.env("RUSTDOCFLAGS", "--deny warnings"));
     if program::build(tally, Profile::Debug).is_some() {
@@ -39,8 +41,8 @@ pub fn everything(tally: &mut Tally) {
     viewer::check(tally);
 }
 
-/// All tests, those of the documentation among them: the command in the README, which goes on after the first failure here so that the
-/// count is whole.
+/// All tests, those of the documentation among them: the command in the README, which goes on after the first failure
+/// here so that the count is whole.
 pub fn tests(tally: &mut Tally, args: &[String]) {
     let mut command = cargo(&["test", "--workspace", "--no-fail-fast"]);
     tally.run_tests("cargo test --workspace", command.args(args));
@@ -75,7 +77,11 @@ pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<Recorded> {
                     &step,
                     result.map(|report| {
                         println!("   {step}: passed, {:.1} s simulated in {:.1} s CPU", report.simulated, report.cpu);
-                        recorded.push(Recorded { name: name.clone(), input: report.input, trajectory: report.trajectory });
+                        recorded.push(Recorded {
+                            name: name.clone(),
+                            input: report.input,
+                            trajectory: report.trajectory,
+                        });
                     }),
                 );
             }
@@ -100,7 +106,10 @@ pub fn glb(tally: &mut Tally, recorded: &[Recorded]) {
 
 /// Every scene has the same state after every step in the debug build and in one for other features of the processor.
 fn same_bits(tally: &mut Tally, recorded: &[Recorded]) {
-    let (Some(release), Some(debug)) = (program::build(tally, Profile::Release), program::build(tally, Profile::Debug)) else { return };
+    let (Some(release), Some(debug)) = (program::build(tally, Profile::Release), program::build(tally, Profile::Debug))
+    else {
+        return;
+    };
     println!();
     let count = |tally: &mut Tally, step: String, result: Result<(), String>| {
         if result.is_ok() {
@@ -111,7 +120,9 @@ fn same_bits(tally: &mut Tally, recorded: &[Recorded]) {
     for Recorded { name, input, .. } in recorded {
         count(tally, format!("same bits of {name}, debug build"), debug.replay(input, LONGEST));
         if RUN_AGAIN.contains(&name.as_str()) {
-            let again = debug.run_scene(name, &format!("{name}-debug"), LONGEST).and_then(|report| release.compare(input, &report.input));
+            let again = debug
+                .run_scene(name, &format!("{name}-debug"), LONGEST)
+                .and_then(|report| release.compare(input, &report.input));
             count(tally, format!("same bits of {name}, run by the debug build"), again);
         }
     }

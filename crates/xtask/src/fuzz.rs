@@ -1,7 +1,8 @@
 //! Builds the fuzzer and runs its targets for a time. What a target is, is in `crates/fuzz`.
 //!
-//! The fuzzer is libFuzzer, which the crate `libfuzzer-sys` brings as C++ sources. The flags are those that `cargo fuzz` passes to a stable
-//! compiler, so that neither cargo-fuzz nor a nightly toolchain has to be there: only a C++ compiler.
+//! The fuzzer is libFuzzer, which the crate `libfuzzer-sys` brings as C++ sources. The flags are those that `cargo
+//! fuzz` passes to a stable compiler, so that neither cargo-fuzz nor a nightly toolchain has to be there: only a C++
+//! compiler.
 
 use crate::tally::{Tally, cargo, root, target};
 use std::io::{BufRead as _, BufReader};
@@ -18,7 +19,15 @@ const TIMEOUT: &str = "-timeout=20";
 const MEMORY: &str = "-rss_limit_mb=4000";
 
 /// Longest input of each target \[bytes\]: what is longer only says the same again.
-const LONGEST: &[(&str, u32)] = &[("edits", 600), ("expr", 400), ("knot", 1200), ("saved", 300), ("scene", 3000), ("snapshot", 300), ("trajectory", 300)];
+const LONGEST: &[(&str, u32)] = &[
+    ("edits", 600),
+    ("expr", 400),
+    ("knot", 1200),
+    ("saved", 300),
+    ("scene", 3000),
+    ("snapshot", 300),
+    ("trajectory", 300),
+];
 
 /// `cargo xtask fuzz [TARGET] [--minutes M]`.
 pub fn command(tally: &mut Tally, args: &[String]) -> Result<(), String> {
@@ -32,7 +41,12 @@ pub fn command(tally: &mut Tally, args: &[String]) -> Result<(), String> {
             }
             name => match LONGEST.iter().find(|(t, _)| *t == name) {
                 Some((t, _)) => only = Some(*t),
-                None => return Err(format!("there is no fuzz target `{name}`; there are {}", LONGEST.iter().map(|(t, _)| *t).collect::<Vec<_>>().join(", "))),
+                None => {
+                    return Err(format!(
+                        "there is no fuzz target `{name}`; there are {}",
+                        LONGEST.iter().map(|(t, _)| *t).collect::<Vec<_>>().join(", ")
+                    ));
+                }
             },
         }
     }
@@ -40,7 +54,8 @@ pub fn command(tally: &mut Tally, args: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Runs one target or all for so many seconds each. What the fuzzer keeps goes to the folder of build output; a fault stays there too.
+/// Runs one target or all for so many seconds each. What the fuzzer keeps goes to the folder of build output; a fault
+/// stays there too.
 pub fn run(tally: &mut Tally, only: Option<&str>, seconds: f64) {
     let Some(programs) = build(tally) else { return };
     for (name, longest) in LONGEST.iter().filter(|(name, _)| only.is_none_or(|o| o == *name)) {
@@ -59,12 +74,21 @@ pub fn run(tally: &mut Tally, only: Option<&str>, seconds: f64) {
             command.arg(format!("-dict={}", root().join("fuzz/scene.dict").display()));
         }
         command.arg(&corpus);
-        command.args(["corpus", "faults"].map(|kind| root().join("fuzz").join(kind).join(name)).into_iter().filter(|f| f.is_dir()));
+        command.args(
+            ["corpus", "faults"]
+                .map(|kind| root().join("fuzz").join(kind).join(name))
+                .into_iter()
+                .filter(|f| f.is_dir()),
+        );
         println!("\n== fuzz {name} for {seconds:.0} s");
         let result = watch(&mut command);
         match &result {
             Ok(what) => println!("   fuzz {name}: passed, {what}"),
-            Err(_) => println!("   the input is in {}; `{} INPUT` tries it again", faults.display(), programs.join(name).display()),
+            Err(_) => println!(
+                "   the input is in {}; `{} INPUT` tries it again",
+                faults.display(),
+                programs.join(name).display()
+            ),
         }
         tally.count(&format!("fuzz {name}"), result.map(|_| ()));
     }
@@ -74,10 +98,16 @@ pub fn run(tally: &mut Tally, only: Option<&str>, seconds: f64) {
 fn watch(command: &mut Command) -> Result<String, String> {
     // A line for all that is new, then the fault or the counts.
     const SHOWN: usize = 50;
-    let mut child = command.stdin(Stdio::null()).stderr(Stdio::piped()).spawn().map_err(|e| format!("{}: {e}", command.get_program().display()))?;
+    let mut child = command
+        .stdin(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|e| format!("{}: {e}", command.get_program().display()))?;
     let mut lines = Vec::new();
     if let Some(out) = child.stderr.take() {
-        lines.extend(BufReader::new(out).split(b'\n').map_while(Result::ok).map(|l| String::from_utf8_lossy(&l).into_owned()));
+        lines.extend(
+            BufReader::new(out).split(b'\n').map_while(Result::ok).map(|l| String::from_utf8_lossy(&l).into_owned()),
+        );
     }
     let status = child.wait().map_err(|e| e.to_string())?;
     if status.success() {
@@ -89,7 +119,11 @@ fn watch(command: &mut Command) -> Result<String, String> {
 /// Inputs tried and places of the code reached, from what libFuzzer prints at its end.
 fn summary(lines: &[String]) -> String {
     let after = |word: &str| lines.iter().rev().find_map(|l| l.split_once(word)?.1.split_whitespace().next());
-    format!("{} inputs, {} places of the code", after("stat::number_of_executed_units:").unwrap_or("?"), after(" cov: ").unwrap_or("?"))
+    format!(
+        "{} inputs, {} places of the code",
+        after("stat::number_of_executed_units:").unwrap_or("?"),
+        after(" cov: ").unwrap_or("?")
+    )
 }
 
 /// The folder of the built programs; `None` when they cannot be built here, and why is printed.
@@ -101,7 +135,10 @@ fn build(tally: &mut Tally) -> Option<PathBuf> {
     // The only tool that a Rust toolchain does not bring. What the crate `cc` would take.
     let compiler = std::env::var("CXX").unwrap_or_else(|_| "c++".into());
     if !Command::new(&compiler).arg("--version").output().is_ok_and(|o| o.status.success()) {
-        tally.skip("fuzzing", &format!("there is no C++ compiler `{compiler}` for libFuzzer; the corpus is replayed by the tests"));
+        tally.skip(
+            "fuzzing",
+            &format!("there is no C++ compiler `{compiler}` for libFuzzer; the corpus is replayed by the tests"),
+        );
         return None;
     }
     // Apart from the build, so that a machine without a network is told from a fuzzer that does not build.
@@ -111,7 +148,16 @@ fn build(tally: &mut Tally) -> Option<PathBuf> {
     }
     let folder = target().join("fuzz");
     // Named, so that build scripts and macros are built without the flags.
-    let mut command = cargo(&["build", "--quiet", "--release", "--manifest-path", "fuzz/Cargo.toml", "--target", &host, "--target-dir"]);
+    let mut command = cargo(&[
+        "build",
+        "--quiet",
+        "--release",
+        "--manifest-path",
+        "fuzz/Cargo.toml",
+        "--target",
+        &host,
+        "--target-dir",
+    ]);
     command.arg(&folder).env("RUSTFLAGS", FLAGS);
     tally.run("fuzzer", &mut command).then(|| folder.join(host).join("release"))
 }
@@ -129,15 +175,21 @@ mod tests {
 
     #[test]
     fn every_target_has_a_longest_input() {
-        let mut folders: Vec<String> =
-            std::fs::read_dir(root().join("fuzz/corpus")).unwrap().map(|f| f.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        let mut folders: Vec<String> = std::fs::read_dir(root().join("fuzz/corpus"))
+            .unwrap()
+            .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
         folders.sort();
         assert_eq!(folders, LONGEST.iter().map(|(name, _)| *name).collect::<Vec<_>>());
     }
 
     #[test]
     fn what_the_fuzzer_did_is_read_from_its_last_lines() {
-        let lines = ["#1912\tNEW    cov: 1600 ft: 6563", "#2000\tDONE   cov: 1695 ft: 6563 corp: 447/114Kb", "stat::number_of_executed_units: 2000"];
+        let lines = [
+            "#1912\tNEW    cov: 1600 ft: 6563",
+            "#2000\tDONE   cov: 1695 ft: 6563 corp: 447/114Kb",
+            "stat::number_of_executed_units: 2000",
+        ];
         assert_eq!(summary(&lines.map(str::to_string)), "2000 inputs, 1695 places of the code");
     }
 

@@ -1,5 +1,5 @@
-//! Chores of this repository, run as `cargo xtask <command>`. Every command that the checks consist of is written down here and nowhere
-//! else; `.ci/run` only calls `cargo xtask ci`.
+//! Chores of this repository, run as `cargo xtask <command>`. Every command that the checks consist of is written down
+//! here and nowhere else; `.ci/run` only calls `cargo xtask ci`.
 
 mod ci;
 mod fuzz;

@@ -41,7 +41,8 @@ pub fn build(tally: &mut Tally, profile: Profile) -> Option<Program> {
 
 /// An example of the debug build.
 pub fn example(name: &str) -> Command {
-    let mut command = Command::new(target().join("debug/examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)));
+    let mut command =
+        Command::new(target().join("debug/examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX)));
     command.current_dir(root()).stdin(Stdio::null());
     command
 }
@@ -79,13 +80,19 @@ impl Program {
     pub fn export_glb(&self, trajectory: &Path) -> Result<PathBuf, String> {
         let glb = trajectory.with_extension("glb");
         let _ = std::fs::remove_file(&glb);
-        status_within(self.command().args(["export", "--quiet"]).arg(trajectory).arg("--out").arg(&glb), Duration::from_secs(60))?;
+        status_within(
+            self.command().args(["export", "--quiet"]).arg(trajectory).arg("--out").arg(&glb),
+            Duration::from_secs(60),
+        )?;
         Ok(glb)
     }
 
     /// Compares two recorded inputs and their states.
     pub fn compare(&self, input: &Path, other: &Path) -> Result<(), String> {
-        status_within(self.command().args(["replay", "--quiet"]).arg(input).arg("--with").arg(other), Duration::from_secs(60))
+        status_within(
+            self.command().args(["replay", "--quiet"]).arg(input).arg("--with").arg(other),
+            Duration::from_secs(60),
+        )
     }
 
     /// Runs a sample scene with the recorder of another build; what it recorded.
@@ -126,8 +133,8 @@ impl GlbValidator {
     }
 }
 
-/// Features of the processor for which a second build is made: with AVX2 and fused multiply-add the compiler may vectorize and contract
-/// otherwise, and must not.
+/// Features of the processor for which a second build is made: with AVX2 and fused multiply-add the compiler may
+/// vectorize and contract otherwise, and must not.
 pub const OTHER_FEATURES: &str = "x86-64-v3";
 
 /// Whether this processor has them.
@@ -146,7 +153,8 @@ pub fn has_other_features() -> bool {
 /// A recorder of scenes for these features: not the whole program, which takes several times as long to build.
 pub fn build_for_other_features(tally: &mut Tally, step: &str) -> Option<Program> {
     let folder = target().join("other-features");
-    let mut command = cargo(&["build", "--release", "--package", "sutura-scene", "--example", "record", "--target-dir"]);
+    let mut command =
+        cargo(&["build", "--release", "--package", "sutura-scene", "--example", "record", "--target-dir"]);
     command.arg(&folder).env("RUSTFLAGS", format!("-C target-cpu={OTHER_FEATURES}"));
     let path = folder.join("release/examples").join(format!("record{}", std::env::consts::EXE_SUFFIX));
     tally.run(step, &mut command).then_some(Program { path })

@@ -7,14 +7,18 @@ use std::process::Command;
 pub fn ready(tally: &mut Tally) {
     tally.count("nothing uncommitted", clean());
     let version = env!("CARGO_PKG_VERSION");
-    tally.count(&format!("CHANGELOG.md has {version} and nothing unreleased"), changelog(&read("CHANGELOG.md"), version));
+    tally.count(
+        &format!("CHANGELOG.md has {version} and nothing unreleased"),
+        changelog(&read("CHANGELOG.md"), version),
+    );
     for file in ["LICENSE-MIT", "LICENSE-APACHE", "NOTICE", "docs/images/square_knot.png"] {
         let there = root().join(file).is_file();
         tally.count(&format!("there is {file}"), if there { Ok(()) } else { Err("it is missing") });
     }
     let measured = if measured(&read("README.md")) { Ok(()) } else { Err("the table `Measured` has empty rows") };
     tally.count("README.md says what was measured", measured);
-    tally.run("packages", &mut cargo(&["package", "--workspace", "--exclude", "xtask", "--no-verify", "--allow-dirty"]));
+    tally
+        .run("packages", &mut cargo(&["package", "--workspace", "--exclude", "xtask", "--no-verify", "--allow-dirty"]));
 }
 
 fn read(file: &str) -> String {
@@ -22,18 +26,24 @@ fn read(file: &str) -> String {
 }
 
 fn clean() -> Result<(), String> {
-    let out = Command::new("git").args(["status", "--porcelain"]).current_dir(root()).output().map_err(|e| format!("git: {e}"))?;
+    let out = Command::new("git")
+        .args(["status", "--porcelain"])
+        .current_dir(root())
+        .output()
+        .map_err(|e| format!("git: {e}"))?;
     let changed = String::from_utf8_lossy(&out.stdout);
     if out.status.success() && changed.is_empty() { Ok(()) } else { Err(format!("git status:\n{changed}")) }
 }
 
 /// A heading with the version and a date, and an empty section of what is unreleased.
 fn changelog(text: &str, version: &str) -> Result<(), String> {
-    let dated = |l: &str| l.strip_prefix(&format!("## [{version}] - ")).is_some_and(|date| date.len() == "2026-01-01".len());
+    let dated =
+        |l: &str| l.strip_prefix(&format!("## [{version}] - ")).is_some_and(|date| date.len() == "2026-01-01".len());
     if !text.lines().any(dated) {
         return Err(format!("no heading `## [{version}] - <date>`"));
     }
-    let unreleased = text.lines().skip_while(|l| !l.starts_with("## [Unreleased]")).skip(1).take_while(|l| !l.starts_with("## "));
+    let unreleased =
+        text.lines().skip_while(|l| !l.starts_with("## [Unreleased]")).skip(1).take_while(|l| !l.starts_with("## "));
     match unreleased.filter(|l| !l.trim().is_empty()).count() {
         0 => Ok(()),
         n => Err(format!("{n} lines are still under `Unreleased`")),
@@ -42,8 +52,13 @@ fn changelog(text: &str, version: &str) -> Result<(), String> {
 
 /// Whether every row of the table under `## Measured` is filled in.
 fn measured(readme: &str) -> bool {
-    let rows: Vec<&str> =
-        readme.lines().skip_while(|l| *l != "## Measured").skip(1).take_while(|l| !l.starts_with("## ")).filter(|l| l.starts_with('|')).collect();
+    let rows: Vec<&str> = readme
+        .lines()
+        .skip_while(|l| *l != "## Measured")
+        .skip(1)
+        .take_while(|l| !l.starts_with("## "))
+        .filter(|l| l.starts_with('|'))
+        .collect();
     rows.len() > 2 && rows.iter().all(|r| r.trim_matches('|').split('|').all(|cell| !cell.trim().is_empty()))
 }
 
@@ -72,7 +87,10 @@ mod tests {
     fn the_readme_shows_the_example() {
         let (readme, example) = (read("README.md"), read("crates/sutura/examples/first_thread.rs"));
         let code = example.split_once("\n\n").map_or("", |(_heading, code)| code);
-        assert!(code.contains("fn main()") && readme.contains(code.trim()), "README.md does not have the text of examples/first_thread.rs");
+        assert!(
+            code.contains("fn main()") && readme.contains(code.trim()),
+            "README.md does not have the text of examples/first_thread.rs"
+        );
     }
 
     /// Files that the documents point to exist (the picture is made at the end).

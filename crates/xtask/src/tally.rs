@@ -53,7 +53,10 @@ impl Tally {
         let (result, seconds) = timed(step, || read_tests(command));
         match result {
             Ok((tests, success)) => {
-                println!("   {step}: {} passed, {} failed, {} ignored in {seconds:.0} s", tests.passed, tests.failed, tests.ignored);
+                println!(
+                    "   {step}: {} passed, {} failed, {} ignored in {seconds:.0} s",
+                    tests.passed, tests.failed, tests.ignored
+                );
                 self.passed += tests.passed;
                 self.skipped += tests.ignored;
                 for name in &tests.names {
@@ -95,7 +98,8 @@ pub fn cargo(args: &[&str]) -> Command {
 
 /// The folder of the workspace.
 pub fn root() -> PathBuf {
-    let own = std::env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
+    let own =
+        std::env::var_os("CARGO_MANIFEST_DIR").map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
     own.ancestors().nth(2).expect("this crate is two folders below the workspace").to_path_buf()
 }
 
@@ -150,7 +154,11 @@ impl Tests {
         if let Some(name) = line.strip_prefix("test ").and_then(|l| l.strip_suffix(" ... FAILED")) {
             self.names.push(name.to_string());
         }
-        let Some(counts) = line.strip_prefix("test result: ").and_then(|l| l.split_once(". ")).map(|(_, counts)| counts) else { return };
+        let Some(counts) =
+            line.strip_prefix("test result: ").and_then(|l| l.split_once(". ")).map(|(_, counts)| counts)
+        else {
+            return;
+        };
         for part in counts.split("; ") {
             let Some((number, what)) = part.split_once(' ') else { continue };
             let Ok(number) = number.parse::<u64>() else { continue };
@@ -213,7 +221,10 @@ mod tests {
         assert_eq!((tally.passed, tally.failed), (2, 0));
         tally.run_tests("died", &mut sh("echo 'test result: ok. 2 passed; 0 failed; 0 ignored'; exit 101"));
         assert_eq!((tally.passed, tally.failed), (4, 1));
-        tally.run_tests("one", &mut sh("echo 'test a ... FAILED'; echo 'test result: FAILED. 0 passed; 1 failed; 0 ignored'; exit 101"));
+        tally.run_tests(
+            "one",
+            &mut sh("echo 'test a ... FAILED'; echo 'test result: FAILED. 0 passed; 1 failed; 0 ignored'; exit 101"),
+        );
         assert_eq!((tally.passed, tally.failed), (4, 2));
         tally.run_tests("empty", &mut sh("true"));
         assert_eq!((tally.passed, tally.failed), (4, 3));

@@ -1,10 +1,12 @@
 //! The elastic energy of a discrete rod, its gradient and its Hessian.
 //!
-//! Source: Bergou, Wardetzky, Robinson, Audoly, Grinspun, "Discrete elastic rods", SIGGRAPH 2008: curvature binormal (eq. 1), energies of
-//! bending and twisting, parallel transport along the rod. From Bergou, Audoly, Vouga, Wardetzky, Grinspun, "Discrete
-//! viscous threads", SIGGRAPH 2010: stretching as an energy, reference frames transported in time, and the derivatives of curvature and twist.
+//! Source: Bergou, Wardetzky, Robinson, Audoly, Grinspun, "Discrete elastic rods", SIGGRAPH 2008: curvature binormal
+//! (eq. 1), energies of bending and twisting, parallel transport along the rod. From Bergou, Audoly, Vouga, Wardetzky,
+//! Grinspun, "Discrete viscous threads", SIGGRAPH 2010: stretching as an energy, reference frames transported in time,
+//! and the derivatives of curvature and twist.
 //!
-//! With e, f the edges that meet at a vertex, t_e, t_f their directions, chi = 1 + t_e . t_f, l half the sum of their rest lengths:
+//! With e, f the edges that meet at a vertex, t_e, t_f their directions, chi = 1 + t_e . t_f, l half the sum of their
+//! rest lengths:
 //!
 //! ```text
 //! kb      = 2 t_e x t_f / chi                                curvature binormal, of length 2 tan (angle / 2)
@@ -13,8 +15,8 @@
 //! E       = sum EA/2 (|e| / L - 1)^2 L  +  sum [EI/2 (omega_e - rest)^2 + EI/2 (omega_f - rest)^2 + GJ (tau - rest)^2] / (2 l)        [J]
 //! ```
 //!
-//! The two curvatures of a joint are those of 2008. Their mean, which 2010 has in their place, makes a rod that is twisted by tau from edge to
-//! edge softer in bending by cos^2 (tau / 2): a fifth at twelve turns in eighty edges.
+//! The two curvatures of a joint are those of 2008. Their mean, which 2010 has in their place, makes a rod that is
+//! twisted by tau from edge to edge softer in bending by cos^2 (tau / 2): a fifth at twelve turns in eighty edges.
 //!
 //! Left out: anisotropic sections (the rods compared here are round; EI is one number), plasticity.
 
@@ -34,7 +36,8 @@ pub struct Config {
     pub t: Vec<DVec3>,
     /// First director of the reference frame of each edge.
     pub reference: Vec<DVec3>,
-    /// Angle from the reference frame of the edge before, transported, to that of the edge after each inner vertex \[rad\]. It counts turns.
+    /// Angle from the reference frame of the edge before, transported, to that of the edge after each inner vertex
+    /// \[rad\]. It counts turns.
     pub reference_twist: Vec<f64>,
 }
 
@@ -75,7 +78,8 @@ impl Config {
             })
             .collect();
         let twist = vec![0.0; t.len() - 1];
-        let mut config = Config { x: shape.points.clone(), theta: vec![0.0; t.len()], t, reference, reference_twist: twist };
+        let mut config =
+            Config { x: shape.points.clone(), theta: vec![0.0; t.len()], t, reference, reference_twist: twist };
         config.measure_reference();
         config
     }
@@ -90,7 +94,8 @@ impl Config {
             self.reference_twist[i] += libm::atan2(before.cross(now).dot(b), before.dot(now));
         }
     }
-    /// Takes the vertices and angles of `from` plus `scale` times the step `d`; reference frames are transported from those of `from`.
+    /// Takes the vertices and angles of `from` plus `scale` times the step `d`; reference frames are transported from
+    /// those of `from`.
     pub fn set_moved(&mut self, from: &Config, d: &[f64], scale: f64) {
         for i in 0..self.x.len() {
             self.x[i] = from.x[i] + DVec3::from_slice(&d[4 * i..4 * i + 3]) * scale;
@@ -151,7 +156,8 @@ impl Elastic {
         let rest = Config::new(&rod.rest);
         let length = rod.rest_lengths();
         let i = rod.second_moment();
-        let joints: Vec<Joint> = (0..length.len() - 1).map(|k| rest.joint(k, rest.material(k), rest.material(k + 1))).collect();
+        let joints: Vec<Joint> =
+            (0..length.len() - 1).map(|k| rest.joint(k, rest.material(k), rest.material(k + 1))).collect();
         Elastic {
             joint: length.windows(2).map(|l| 0.5 * (l[0] + l[1])).collect(),
             length,
@@ -183,14 +189,21 @@ impl Elastic {
     }
     /// Twisting moment at each inner vertex \[N m\].
     pub fn twisting(&self, c: &Config) -> Vec<f64> {
-        (0..self.joint.len()).map(|i| self.stiffness[2] * (c.theta[i + 1] - c.theta[i] + c.reference_twist[i] - self.tau[i]) / self.joint[i]).collect()
+        (0..self.joint.len())
+            .map(|i| {
+                self.stiffness[2] * (c.theta[i + 1] - c.theta[i] + c.reference_twist[i] - self.tau[i]) / self.joint[i]
+            })
+            .collect()
     }
     /// Tension of each edge \[N\].
     pub fn tensions(&self, c: &Config) -> Vec<f64> {
-        (0..self.length.len()).map(|i| self.stiffness[0] * (c.x[i].distance(c.x[i + 1]) / self.length[i] - 1.0)).collect()
+        (0..self.length.len())
+            .map(|i| self.stiffness[0] * (c.x[i].distance(c.x[i + 1]) / self.length[i] - 1.0))
+            .collect()
     }
-    /// Adds gradient and Hessian; the unknowns are x, y, z of vertex 0, angle of edge 0, x, y, z of vertex 1 and so on. Without `curved` the
-    /// second derivatives of curvature and twist, and the negative ones of stretching, are left out: that matrix is never indefinite.
+    /// Adds gradient and Hessian; the unknowns are x, y, z of vertex 0, angle of edge 0, x, y, z of vertex 1 and so on.
+    /// Without `curved` the second derivatives of curvature and twist, and the negative ones of stretching, are left
+    /// out: that matrix is never indefinite.
     pub fn assemble(&self, c: &Config, curved: bool, gradient: &mut [f64], hessian: &mut Band) {
         let [ea, ei, gj] = self.stiffness;
         for i in 0..self.length.len() {
@@ -288,7 +301,8 @@ impl Joint {
         let [m1, m2] = if which < 2 { [self.m[0], self.m[1]] } else { [self.m[2], self.m[3]] };
         if which.is_multiple_of(2) { (m2, -m1) } else { (-m1, -m2) }
     }
-    /// Of `kappa` = kb . (de + df), with de fixed in the frame of e and df in that of f; `ue` and `uf` are these turned by a right angle.
+    /// Of `kappa` = kb . (de + df), with de fixed in the frame of e and df in that of f; `ue` and `uf` are these turned
+    /// by a right angle.
     fn curvature_gradient(&self, kappa: f64, de: DVec3, df: DVec3, ue: DVec3, uf: DVec3) -> [f64; 8] {
         let t = (self.te + self.tf) / self.chi;
         let d = (de + df) * (2.0 / self.chi);
@@ -309,11 +323,14 @@ impl Joint {
         let (a, b) = (self.tf.cross(d), self.te.cross(d));
         let tt = outer(t, t) * (2.0 * kappa);
         let id = DMat3::IDENTITY;
-        let ee = (tt - outer(a, t) - outer(t, a) - (id - outer(self.te, self.te)) * (kappa / self.chi) + (outer(self.kb, de) + outer(de, self.kb)) * 0.5)
+        let ee = (tt - outer(a, t) - outer(t, a) - (id - outer(self.te, self.te)) * (kappa / self.chi)
+            + (outer(self.kb, de) + outer(de, self.kb)) * 0.5)
             * (ie * ie);
-        let ff = (tt + outer(b, t) + outer(t, b) - (id - outer(self.tf, self.tf)) * (kappa / self.chi) + (outer(self.kb, df) + outer(df, self.kb)) * 0.5)
+        let ff = (tt + outer(b, t) + outer(t, b) - (id - outer(self.tf, self.tf)) * (kappa / self.chi)
+            + (outer(self.kb, df) + outer(df, self.kb)) * 0.5)
             * (jf * jf);
-        let ef = (tt - outer(a, t) + outer(t, b) - (id + outer(self.te, self.tf)) * (kappa / self.chi) - skew(d)) * (ie * jf);
+        let ef = (tt - outer(a, t) + outer(t, b) - (id + outer(self.te, self.tf)) * (kappa / self.chi) - skew(d))
+            * (ie * jf);
         add_blocks(1.0, ee, ff, ef, h);
         // Turning a frame turns its director d into u, and u into -d.
         for (row, u, dd) in [(3, self.te.cross(de), de), (7, self.tf.cross(df), df)] {
@@ -368,8 +385,13 @@ mod tests {
 
     /// A crooked rod of five edges, bent and twisted, with a rest shape of its own; energies of order one.
     fn crooked() -> (Elastic, Config) {
-        let points =
-            |seed: usize| (0..6).map(|i| DVec3::new(i as f64 + 0.3 * noise(seed + i), 0.4 * noise(seed + 10 + i), 0.4 * noise(seed + 20 + i))).collect();
+        let points = |seed: usize| {
+            (0..6)
+                .map(|i| {
+                    DVec3::new(i as f64 + 0.3 * noise(seed + i), 0.4 * noise(seed + 10 + i), 0.4 * noise(seed + 20 + i))
+                })
+                .collect()
+        };
         let start = Shape::untwisted(points(3), DVec3::Y);
         let rest = Shape::untwisted(points(40), DVec3::Y);
         let mut config = Config::new(&start);
@@ -385,7 +407,8 @@ mod tests {
         elastic.energy(&moved).iter().sum()
     }
 
-    /// Gradient and Hessian against central differences of the energy, frames transported from where the derivatives are taken.
+    /// Gradient and Hessian against central differences of the energy, frames transported from where the derivatives
+    /// are taken.
     #[test]
     fn derivatives_are_those_of_the_energy() {
         let (elastic, config) = crooked();
@@ -393,7 +416,8 @@ mod tests {
         let mut gradient = vec![0.0; n];
         let mut hessian = Band::new(n);
         elastic.assemble(&config, true, &mut gradient, &mut hessian);
-        // Differences of fourth order: error some s^4 = 1e-12 and rounding 1e-16 / s for the gradient, 1e-16 / s^2 for the Hessian.
+        // Differences of fourth order: error some s^4 = 1e-12 and rounding 1e-16 / s for the gradient, 1e-16 / s^2 for
+        // the Hessian.
         let s = 1e-3;
         for k in 0..n {
             let at = |m: f64| {
@@ -420,7 +444,8 @@ mod tests {
         }
     }
 
-    /// A rigid motion and a common turn of all frames cost nothing; the energies of a bent arc and of a twisted line are those of theory.
+    /// A rigid motion and a common turn of all frames cost nothing; the energies of a bent arc and of a twisted line
+    /// are those of theory.
     #[test]
     fn energies_are_those_of_theory() {
         let n = 100;
@@ -443,7 +468,8 @@ mod tests {
         (0..n).for_each(|i| config.theta[i] = 2.0 * i as f64 / (n - 1) as f64);
         let [_, bend, twist] = elastic.energy(&config);
         let ei = 1e6 * rod.second_moment();
-        // Joints reach from the middle of the first edge to that of the last: L = 1 - 1 / n; chords and tangents differ by 1 / n^2.
+        // Joints reach from the middle of the first edge to that of the last: L = 1 - 1 / n; chords and tangents differ
+        // by 1 / n^2.
         let l = 1.0 - 1.0 / n as f64;
         assert!((bend / (0.5 * ei * l) - 1.0).abs() < 1e-4, "{bend}");
         assert!((twist / (0.5 * 0.8 * ei * 4.0 / l) - 1.0).abs() < 1e-12, "{twist}");

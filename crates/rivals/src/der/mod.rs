@@ -1,18 +1,19 @@
 //! Discrete elastic rods with implicit time integration.
 //!
-//! Source: Bergou and others 2008 and 2010, as `energy.rs` says. Vertices and one angle an edge are the unknowns; material frames are turned by
-//! the angles from reference frames, which are transported in time. Where this departs from 2008: stretching is an energy instead of a
-//! projection onto constant lengths, frames are not quasistatic (an edge has the inertia of its section about its axis), and time is integrated
-//! by implicit Euler: a step ends where
+//! Source: Bergou and others 2008 and 2010, as `energy.rs` says. Vertices and one angle an edge are the unknowns;
+//! material frames are turned by the angles from reference frames, which are transported in time. Where this departs
+//! from 2008: stretching is an energy instead of a projection onto constant lengths, frames are not quasistatic (an
+//! edge has the inertia of its section about its axis), and time is integrated by implicit Euler: a step ends where
 //!
 //! ```text
 //! sum m |x - x_predicted|^2 / (2 h^2)  +  sum J (theta - theta_predicted)^2 / (2 h^2)  +  E(x, theta)        [J]
 //! ```
 //!
-//! is least. It is found by Newton's method with the band matrix of all unknowns and a search along each direction. Where the matrix is not
-//! positive definite, that of Gauss and Newton takes its place.
+//! is least. It is found by Newton's method with the band matrix of all unknowns and a search along each direction.
+//! Where the matrix is not positive definite, that of Gauss and Newton takes its place.
 //!
-//! Left out: contact, the momentum of edges that turn across their axis (as in the papers), damping other than the drag of the scene.
+//! Left out: contact, the momentum of edges that turn across their axis (as in the papers), damping other than the drag
+//! of the scene.
 
 mod energy;
 
@@ -29,7 +30,8 @@ pub struct Settings {
     pub substeps: usize,
     /// Newton iterations of a substep at most.
     pub iterations: usize,
-    /// A substep is solved when no vertex moved by more than this, over the mean length of an edge, and no angle by more, in radians.
+    /// A substep is solved when no vertex moved by more than this, over the mean length of an edge, and no angle by
+    /// more, in radians.
     pub tolerance: f64,
 }
 
@@ -59,8 +61,8 @@ pub struct Der {
 }
 
 impl Default for Settings {
-    /// Solved to rounding: a frame takes two to four iterations. Where a step jumps, as when a straight rod is suddenly pressed, it may be a
-    /// hundred and more; the limit is for such.
+    /// Solved to rounding: a frame takes two to four iterations. Where a step jumps, as when a straight rod is suddenly
+    /// pressed, it may be a hundred and more; the limit is for such.
     fn default() -> Self {
         Settings { substeps: 1, iterations: 200, tolerance: 1e-9 }
     }
@@ -70,7 +72,11 @@ impl Der {
     /// At rest in the start shape.
     pub fn new(scene: Scene, settings: Settings) -> Result<Self, Invalid> {
         scene.check()?;
-        if settings.substeps == 0 || settings.iterations == 0 || settings.tolerance.is_nan() || settings.tolerance <= 0.0 {
+        if settings.substeps == 0
+            || settings.iterations == 0
+            || settings.tolerance.is_nan()
+            || settings.tolerance <= 0.0
+        {
             return Err(Invalid("substeps, iterations and tolerance must be positive".into()));
         }
         let rod = &scene.rod;
@@ -130,7 +136,8 @@ impl Der {
     pub fn tensions(&self) -> Vec<f64> {
         self.elastic.tensions(&self.config)
     }
-    /// Forces of stretching, bending and twisting on the vertices \[N\]. At rest a held end bears the negative of those on its vertices.
+    /// Forces of stretching, bending and twisting on the vertices \[N\]. At rest a held end bears the negative of those
+    /// on its vertices.
     pub fn elastic_forces(&self) -> Vec<DVec3> {
         let n = self.masses.len();
         let (mut gradient, mut matrix) = (vec![0.0; 4 * n - 1], Band::new(4 * n - 1));
@@ -172,14 +179,17 @@ impl Der {
     fn lead_ends(&mut self, before: &Config) {
         let n = self.elastic.length.len();
         let mut d1 = [None, None];
-        for (k, hold, end, inner, edge, sign) in [(0, &self.scene.first, 0, 1, 0, 1.0), (1, &self.scene.last, n, n - 1, n - 1, -1.0)] {
+        for (k, hold, end, inner, edge, sign) in
+            [(0, &self.scene.first, 0, 1, 0, 1.0), (1, &self.scene.last, n, n - 1, n - 1, -1.0)]
+        {
             match hold {
                 Hold::Free => {}
                 Hold::Pin(at) => self.config.x[end] = at(self.time),
                 Hold::Clamp(at) => {
                     let pose = at(self.time);
                     self.config.x[end] = pose.position;
-                    self.config.x[inner] = pose.position + pose.orientation * DVec3::Z * (sign * self.elastic.length[edge]);
+                    self.config.x[inner] =
+                        pose.position + pose.orientation * DVec3::Z * (sign * self.elastic.length[edge]);
                     // Measured from the angle before, so that a turn per step of less than half is followed.
                     self.config.theta[edge] = before.theta[edge];
                     d1[k] = Some((edge, pose.orientation * DVec3::X));
@@ -195,8 +205,10 @@ impl Der {
     /// What a step minimizes, at `c`.
     fn merit(&self, c: &Config, h: f64) -> f64 {
         let w = 0.5 / (h * h);
-        let linear: f64 = (0..self.masses.len()).map(|i| self.masses[i] * c.x[i].distance_squared(self.x_predicted[i])).sum();
-        let turning: f64 = (0..self.inertias.len()).map(|i| self.inertias[i] * (c.theta[i] - self.theta_predicted[i]).powi(2)).sum();
+        let linear: f64 =
+            (0..self.masses.len()).map(|i| self.masses[i] * c.x[i].distance_squared(self.x_predicted[i])).sum();
+        let turning: f64 =
+            (0..self.inertias.len()).map(|i| self.inertias[i] * (c.theta[i] - self.theta_predicted[i]).powi(2)).sum();
         w * (linear + turning) + self.elastic.energy(c).iter().sum::<f64>()
     }
 

@@ -25,7 +25,8 @@ pub fn helix(n: usize) -> Shape {
     Shape::untwisted(points, DVec3::X)
 }
 
-/// 40 edges, 15 cm, clamped at both ends along x: in two seconds the ends come together by 5 cm and the last one turns once; gravity along -z.
+/// 40 edges, 15 cm, clamped at both ends along x: in two seconds the ends come together by 5 cm and the last one turns
+/// once; gravity along -z.
 pub fn pressed_and_turned(turns: f64) -> Scene {
     let (n, edge) = (40, 0.15 / 40.0);
     // d1 lies in the plane in which the rod sags, so that no method has a reason to leave it but the turn.

@@ -1,4 +1,5 @@
-//! Where a picture is taken from: the camera, which way it looks best, and which part of the threads is worth a closer look.
+//! Where a picture is taken from: the camera, which way it looks best, and which part of the threads is worth a closer
+//! look.
 
 use super::cast::Ray;
 use super::stage::Stage;
@@ -21,7 +22,8 @@ pub struct Look {
     pub orthographic: bool,
 }
 
-/// Half the opening angle of the perspective, as a tangent: narrow, so that a thread's thickness hardly depends on its depth.
+/// Half the opening angle of the perspective, as a tangent: narrow, so that a thread's thickness hardly depends on its
+/// depth.
 const HALF_FIELD: f64 = 0.2;
 
 /// The eye, or the screen of parallel rays.
@@ -69,7 +71,16 @@ impl Camera {
             },
             |w| 0.5 * w,
         );
-        Camera { at, right, up, forward, half_width, aspect, distance: half_width / HALF_FIELD, orthographic: look.orthographic }
+        Camera {
+            at,
+            right,
+            up,
+            forward,
+            half_width,
+            aspect,
+            distance: half_width / HALF_FIELD,
+            orthographic: look.orthographic,
+        }
     }
 
     /// Width of the picture at the point looked at \[m\].
@@ -83,12 +94,16 @@ impl Camera {
         if self.orthographic {
             Ray { origin: self.at + screen - self.forward * self.distance, direction: self.forward }
         } else {
-            Ray { origin: self.at - self.forward * self.distance, direction: (screen + self.forward * self.distance).normalize() }
+            Ray {
+                origin: self.at - self.forward * self.distance,
+                direction: (screen + self.forward * self.distance).normalize(),
+            }
         }
     }
 
     fn toward(&self, p: DVec3) -> Ray {
-        let back = if self.orthographic { -self.forward } else { (self.at - self.forward * self.distance - p).normalize() };
+        let back =
+            if self.orthographic { -self.forward } else { (self.at - self.forward * self.distance - p).normalize() };
         Ray { origin: p, direction: back }
     }
 }
@@ -105,19 +120,27 @@ pub fn best_direction(subject: &Subject, points: &[DVec3], up: DVec3) -> DVec3 {
         for k in 0..16 {
             let turn = TAU * (f64::from(k) + 0.35) / 16.0;
             let back = (x * turn.cos() + y * turn.sin()) * f64::cos(height) + up * f64::sin(height);
-            let camera = Camera::fit(&Look { direction: Some(-back), up: Some(up), ..Look::default() }, points, 0.02 * size, Size { width: 4, height: 3 });
+            let camera = Camera::fit(
+                &Look { direction: Some(-back), up: Some(up), ..Look::default() },
+                points,
+                0.02 * size,
+                Size { width: 4, height: 3 },
+            );
             let mut seen = 0.0;
             let mut spread = [0.0; 3];
             for p in points.iter().step_by(1 + points.len() / 200) {
                 let ray = camera.toward(*p);
                 let start = Ray { origin: *p + ray.direction * (0.02 * size), ..ray };
-                let clear = !stage.blocked(&start, f64::INFINITY) && stage.floors.iter().all(|f| ray.direction.dot(f.normal) > 0.0);
+                let clear = !stage.blocked(&start, f64::INFINITY)
+                    && stage.floors.iter().all(|f| ray.direction.dot(f.normal) > 0.0);
                 seen += if clear { 1.0 } else { 0.0 };
                 let (u, v) = ((*p - middle).dot(camera.right), (*p - middle).dot(camera.up));
                 spread = [spread[0] + u * u, spread[1] + v * v, spread[2] + 1.0];
             }
             // Wide rather than high suits the page; half of the score is being seen at all.
-            let score = seen / spread[2] + 0.6 * (spread[0] / spread[2]).sqrt() / size + 0.5 * (spread[1] / spread[2]).sqrt() / size;
+            let score = seen / spread[2]
+                + 0.6 * (spread[0] / spread[2]).sqrt() / size
+                + 0.5 * (spread[1] / spread[2]).sqrt() / size;
             if score > best.0 {
                 best = (score, -back);
             }
@@ -126,8 +149,8 @@ pub fn best_direction(subject: &Subject, points: &[DVec3], up: DVec3) -> DVec3 {
     best.1
 }
 
-/// The part of the threads worth a closer look: points where thread lies near other thread (or near itself, `pi` radii along it
-/// left out); where there is none, around the sharpest bend; nothing when the threads are nearly straight.
+/// The part of the threads worth a closer look: points where thread lies near other thread (or near itself, `pi` radii
+/// along it left out); where there is none, around the sharpest bend; nothing when the threads are nearly straight.
 pub fn knot_region(tubes: &[Tube]) -> Vec<DVec3> {
     let all: Vec<(usize, f64, DVec3, f64)> = tubes
         .iter()
@@ -146,7 +169,8 @@ pub fn knot_region(tubes: &[Tube]) -> Vec<DVec3> {
         let touching = |(k, s, p, r): &(usize, f64, DVec3, f64)| {
             all.iter().any(|(k2, s2, p2, r2)| {
                 let reach = factor * (r + r2);
-                (p2 - p).length_squared() < reach * reach && (k != k2 || (s - s2).abs() > PI * (factor + 1.0) * r.max(*r2))
+                (p2 - p).length_squared() < reach * reach
+                    && (k != k2 || (s - s2).abs() > PI * (factor + 1.0) * r.max(*r2))
             })
         };
         all.iter().filter(|a| touching(a)).map(|a| a.2).collect::<Vec<_>>()
@@ -176,7 +200,8 @@ mod tests {
 
     #[test]
     fn everything_fits_into_the_picture() {
-        let points: Vec<DVec3> = (0..200).map(|i| f64::from(i) * 0.1).map(|t| DVec3::new(t.cos(), 2.0 * t.sin(), 0.3 * t) * 1e-2).collect();
+        let points: Vec<DVec3> =
+            (0..200).map(|i| f64::from(i) * 0.1).map(|t| DVec3::new(t.cos(), 2.0 * t.sin(), 0.3 * t) * 1e-2).collect();
         for orthographic in [false, true] {
             let look = Look { direction: Some(DVec3::new(0.4, 0.7, -0.3)), orthographic, ..Look::default() };
             let camera = Camera::fit(&look, &points, 1e-3, Size { width: 400, height: 300 });
@@ -185,7 +210,10 @@ mod tests {
                 let d = *p - camera.at;
                 let depth = d.dot(camera.forward);
                 let scale = if orthographic { 1.0 } else { camera.distance / (camera.distance + depth) };
-                let (u, v) = (d.dot(camera.right) * scale / camera.half_width, d.dot(camera.up) * scale * camera.aspect / camera.half_width);
+                let (u, v) = (
+                    d.dot(camera.right) * scale / camera.half_width,
+                    d.dot(camera.up) * scale * camera.aspect / camera.half_width,
+                );
                 assert!(u.abs() < 1.0 && v.abs() < 1.0, "{u} {v}");
                 widest = widest.max(u.abs()).max(v.abs());
             }

@@ -28,19 +28,35 @@ pub(super) struct Capsule {
     axis: DVec3,
     length: f64,
     radius: f64,
-    /// Tangents of a curve of which this is a piece, at its two ends: its normals are across them. Zero at an end of the curve.
+    /// Tangents of a curve of which this is a piece, at its two ends: its normals are across them. Zero at an end of
+    /// the curve.
     tangents: [DVec3; 2],
 }
 
 impl Capsule {
     pub fn new(start: DVec3, end: DVec3, radius: f64) -> Capsule {
-        Capsule { start, axis: (end - start).normalize_or_zero(), length: (end - start).length(), radius, tangents: [DVec3::ZERO; 2] }
+        Capsule {
+            start,
+            axis: (end - start).normalize_or_zero(),
+            length: (end - start).length(),
+            radius,
+            tangents: [DVec3::ZERO; 2],
+        }
     }
 
     /// The pieces of a curve.
     pub fn chain(points: &[DVec3], radius: f64) -> impl Iterator<Item = Capsule> + '_ {
-        let tangent = move |i: usize| if i == 0 || i + 1 == points.len() { DVec3::ZERO } else { (points[i + 1] - points[i - 1]).normalize_or_zero() };
-        (1..points.len()).map(move |i| Capsule { tangents: [tangent(i - 1), tangent(i)], ..Capsule::new(points[i - 1], points[i], radius) })
+        let tangent = move |i: usize| {
+            if i == 0 || i + 1 == points.len() {
+                DVec3::ZERO
+            } else {
+                (points[i + 1] - points[i - 1]).normalize_or_zero()
+            }
+        };
+        (1..points.len()).map(move |i| Capsule {
+            tangents: [tangent(i - 1), tangent(i)],
+            ..Capsule::new(points[i - 1], points[i], radius)
+        })
     }
 }
 
@@ -56,7 +72,9 @@ impl Primitive {
                 let end = c.start + c.axis * c.length;
                 Bounds { low: c.start.min(end) - c.radius, high: c.start.max(end) + c.radius }
             }
-            Primitive::Cylinder { pose, radius, half_length } => around(pose, DVec3::new(*radius, *radius, *half_length)),
+            Primitive::Cylinder { pose, radius, half_length } => {
+                around(pose, DVec3::new(*radius, *radius, *half_length))
+            }
             Primitive::Box { pose, half_sides } => around(pose, *half_sides),
             Primitive::Triangle([a, b, c]) => Bounds { low: a.min(*b).min(*c), high: a.max(*b).max(*c) },
         }
@@ -66,7 +84,9 @@ impl Primitive {
     fn hit(&self, ray: &Ray, far: f64) -> Option<Hit> {
         match self {
             Primitive::Capsule(c) => hit_capsule(ray, c, far),
-            Primitive::Cylinder { pose, radius, half_length } => in_frame(pose, ray, |r| hit_cylinder(r, *radius, *half_length, far)),
+            Primitive::Cylinder { pose, radius, half_length } => {
+                in_frame(pose, ray, |r| hit_cylinder(r, *radius, *half_length, far))
+            }
             Primitive::Box { pose, half_sides } => in_frame(pose, ray, |r| hit_box(r, *half_sides, far)),
             Primitive::Triangle(corners) => hit_triangle(ray, corners, far),
         }
@@ -74,11 +94,15 @@ impl Primitive {
 }
 
 fn in_frame(pose: &Pose, ray: &Ray, hit: impl Fn(&Ray) -> Option<Hit>) -> Option<Hit> {
-    let local = Ray { origin: pose.inverse_transform_point(ray.origin), direction: pose.orientation.conjugate() * ray.direction };
+    let local = Ray {
+        origin: pose.inverse_transform_point(ray.origin),
+        direction: pose.orientation.conjugate() * ray.direction,
+    };
     hit(&local).map(|h| Hit { normal: pose.orientation * h.normal, ..h })
 }
 
-/// The smaller root of |o + t d - axis|^2 = r^2 with the axis of direction `u` (unit; zero for a sphere) through the origin of `o`.
+/// The smaller root of |o + t d - axis|^2 = r^2 with the axis of direction `u` (unit; zero for a sphere) through the
+/// origin of `o`.
 fn entry(o: DVec3, d: DVec3, u: DVec3, radius: f64) -> Option<f64> {
     let (o, d) = (o - u * o.dot(u), d - u * d.dot(u));
     let (a, b, c) = (d.length_squared(), o.dot(d), o.length_squared() - radius * radius);
@@ -87,7 +111,8 @@ fn entry(o: DVec3, d: DVec3, u: DVec3, radius: f64) -> Option<f64> {
 }
 
 fn hit_capsule(ray: &Ray, c: &Capsule, far: f64) -> Option<Hit> {
-    // From the point of the ray nearest to the start: at a meter's distance the roots of a tenth of a millimeter lose digits.
+    // From the point of the ray nearest to the start: at a meter's distance the roots of a tenth of a millimeter lose
+    // digits.
     let shift = (c.start - ray.origin).dot(ray.direction);
     let o = ray.origin + ray.direction * shift - c.start;
     let t = entry(o, ray.direction, c.axis, c.radius);
@@ -144,7 +169,8 @@ fn hit_triangle(ray: &Ray, [a, b, c]: &[DVec3; 3], far: f64) -> Option<Hit> {
     let q = o.cross(ray.direction);
     let (u, v) = (e2.dot(q) / facing, -e1.dot(q) / facing);
     // Both sides are seen; the normal is turned to the ray.
-    (t > 0.0 && t < far && u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| Hit { t, normal: n.normalize() * facing.signum() })
+    (t > 0.0 && t < far && u >= 0.0 && v >= 0.0 && u + v <= 1.0)
+        .then(|| Hit { t, normal: n.normalize() * facing.signum() })
 }
 
 #[derive(Clone, Copy)]
@@ -165,8 +191,8 @@ impl Bounds {
     }
 }
 
-/// A tree of bounding boxes over the primitives, halved at the median of the longest side. Solids larger than a few pieces of thread
-/// would make every box large; they stand beside the tree.
+/// A tree of bounding boxes over the primitives, halved at the median of the longest side. Solids larger than a few
+/// pieces of thread would make every box large; they stand beside the tree.
 pub(super) struct Tree {
     large: Vec<(Primitive, Color)>,
     nodes: Vec<Node>,
@@ -206,7 +232,11 @@ impl Tree {
             return;
         }
         let side = bounds.high - bounds.low;
-        let axis = if side.x >= side.y && side.x >= side.z { DVec3::X } else { [DVec3::Y, DVec3::Z][usize::from(side.z > side.y)] };
+        let axis = if side.x >= side.y && side.x >= side.z {
+            DVec3::X
+        } else {
+            [DVec3::Y, DVec3::Z][usize::from(side.z > side.y)]
+        };
         let key = |p: &(Primitive, Color)| {
             let b = p.0.bounds();
             (b.low + b.high).dot(axis)
@@ -240,7 +270,8 @@ impl Tree {
             return best;
         }
         let inverse = ray.direction.recip();
-        let enter = |index: usize, far: f64| self.nodes[index].bounds.enter(ray.origin, inverse, far).map(|near| (near, index));
+        let enter =
+            |index: usize, far: f64| self.nodes[index].bounds.enter(ray.origin, inverse, far).map(|near| (near, index));
         // A tree halved at the median is no deeper than the logarithm of its size.
         let mut stack = [(0.0, 0_usize); 64];
         let mut height = 0;
@@ -316,7 +347,10 @@ mod tests {
                         hits += 1;
                         // Twelve digits are left of sixteen after the roots of a quadratic.
                         assert!(inside(hit.t).abs() < 1e-11, "on the surface: {}", inside(hit.t));
-                        assert!((hit.normal.length() - 1.0).abs() < 1e-9 && hit.normal.dot(ray.direction) < 1e-9, "toward the eye");
+                        assert!(
+                            (hit.normal.length() - 1.0).abs() < 1e-9 && hit.normal.dot(ray.direction) < 1e-9,
+                            "toward the eye"
+                        );
                         let b = primitive.bounds();
                         let p = ray.origin + ray.direction * hit.t;
                         assert!((b.low - 1e-9).cmple(p).all() && (b.high + 1e-9).cmpge(p).all(), "within its bounds");
@@ -336,11 +370,13 @@ mod tests {
     #[test]
     fn a_triangle_is_hit_inside_its_sides() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
-        let down = |x: f64, y: f64| hit_triangle(&Ray { origin: DVec3::new(x, y, 2.0), direction: -DVec3::Z }, &corners, 10.0);
+        let down =
+            |x: f64, y: f64| hit_triangle(&Ray { origin: DVec3::new(x, y, 2.0), direction: -DVec3::Z }, &corners, 10.0);
         let hit = down(0.2, 0.3).expect("inside");
         assert!((hit.t - 2.0).abs() < 1e-15 && hit.normal == DVec3::Z);
         assert!(down(0.6, 0.6).is_none() && down(-0.1, 0.5).is_none());
-        let up = hit_triangle(&Ray { origin: DVec3::new(0.2, 0.3, -1.0), direction: DVec3::Z }, &corners, 10.0).expect("from below");
+        let up = hit_triangle(&Ray { origin: DVec3::new(0.2, 0.3, -1.0), direction: DVec3::Z }, &corners, 10.0)
+            .expect("from below");
         assert_eq!(up.normal, -DVec3::Z);
     }
 }

@@ -38,15 +38,20 @@ impl Stage {
             let pose = solid.pose;
             match &solid.geometry {
                 Geometry::Plane => floors.push(Floor { point: pose.position, normal: pose.orientation * DVec3::Z }),
-                Geometry::Sphere { radius } => primitives.push((Primitive::Capsule(Capsule::new(pose.position, pose.position, *radius)), color)),
+                Geometry::Sphere { radius } => {
+                    primitives.push((Primitive::Capsule(Capsule::new(pose.position, pose.position, *radius)), color))
+                }
                 Geometry::Capsule { radius, half_length } => {
-                    let (a, b) = (pose.transform_point(DVec3::Z * *half_length), pose.transform_point(DVec3::Z * -half_length));
+                    let (a, b) =
+                        (pose.transform_point(DVec3::Z * *half_length), pose.transform_point(DVec3::Z * -half_length));
                     primitives.push((Primitive::Capsule(Capsule::new(a, b, *radius)), color));
                 }
                 Geometry::Cylinder { radius, half_length } => {
                     primitives.push((Primitive::Cylinder { pose, radius: *radius, half_length: *half_length }, color));
                 }
-                Geometry::Box { half_sides } => primitives.push((Primitive::Box { pose, half_sides: *half_sides }, color)),
+                Geometry::Box { half_sides } => {
+                    primitives.push((Primitive::Box { pose, half_sides: *half_sides }, color))
+                }
                 Geometry::Mesh { vertices, triangles } => {
                     for t in triangles {
                         let corner = |k: usize| pose.transform_point(vertices[t[k] as usize]);
@@ -63,10 +68,10 @@ impl Stage {
     }
 }
 
-/// Points of a smooth curve near the polyline `x`: a quadratic B-spline whose control points are moved out by a sixteenth of the
-/// second difference, so that it leaves the polyline by no more than a sixteenth of it, outward at the middles of the elements and
-/// inward at the joints alike. Neighboring pieces turn by at most 0.08 rad, which an outline hardly shows, and
-/// shading turns smoothly from one to the next (see [`Capsule`]).
+/// Points of a smooth curve near the polyline `x`: a quadratic B-spline whose control points are moved out by a
+/// sixteenth of the second difference, so that it leaves the polyline by no more than a sixteenth of it, outward at the
+/// middles of the elements and inward at the joints alike. Neighboring pieces turn by at most 0.08 rad, which an
+/// outline hardly shows, and shading turns smoothly from one to the next (see [`Capsule`]).
 fn smooth(x: &[DVec3]) -> Vec<DVec3> {
     let n = x.len();
     if n < 3 {
@@ -155,8 +160,8 @@ fn openness(stage: &Stage, p: DVec3, normal: DVec3, reach: f64, dice: &mut Dice)
     open / f64::from(OCCLUSION_RAYS)
 }
 
-/// Evenly spread pairs in the unit square: the sequence of the plastic number (Roberts 2018). Every pixel uses the same ones, so that
-/// what is smooth looks smooth and not grainy.
+/// Evenly spread pairs in the unit square: the sequence of the plastic number (Roberts 2018). Every pixel uses the same
+/// ones, so that what is smooth looks smooth and not grainy.
 pub(super) struct Dice {
     at: (f64, f64),
 }
@@ -192,11 +197,13 @@ mod tests {
 
     #[test]
     fn the_smooth_curve_stays_near_the_polyline() {
-        let x: Vec<DVec3> = (0..=24).map(|i| f64::from(i) * 0.5).map(|t| DVec3::new(t.cos(), t.sin(), 0.2 * t)).collect();
+        let x: Vec<DVec3> =
+            (0..=24).map(|i| f64::from(i) * 0.5).map(|t| DVec3::new(t.cos(), t.sin(), 0.2 * t)).collect();
         let curve = smooth(&x);
         assert_eq!((curve[0], curve[curve.len() - 1]), (x[0], x[24]));
-        // The second difference of a circle of radius 1 in steps of 0.5 rad is 2 (1 - cos 0.5) = 0.245: a sixteenth of it is 0.0153, and
-        // the curve's own second order adds a tenth. The first and last pieces, which begin at the end itself, keep within an eighth.
+        // The second difference of a circle of radius 1 in steps of 0.5 rad is 2 (1 - cos 0.5) = 0.245: a sixteenth of
+        // it is 0.0153, and the curve's own second order adds a tenth. The first and last pieces, which begin at the
+        // end itself, keep within an eighth.
         let far = |p: &DVec3| {
             let to_segment = |w: &[DVec3]| {
                 let d = w[1] - w[0];

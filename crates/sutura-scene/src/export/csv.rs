@@ -27,7 +27,10 @@ impl Writer for Csv {
         for (thread, strand) in header.threads.iter().zip(&moment.threads) {
             for (i, x) in strand.positions.iter().enumerate() {
                 // The last particle has no element after it.
-                let q = strand.orientations.get(i).map_or([const { String::new() }; 4], |q| q.to_array().map(|v| v.to_string()));
+                let q = strand
+                    .orientations
+                    .get(i)
+                    .map_or([const { String::new() }; 4], |q| q.to_array().map(|v| v.to_string()));
                 let [x, y, z] = x.to_array().map(|v| v.to_string());
                 let [a, b, c, d] = q;
                 self.row([moment.time.to_string(), thread.name.clone(), i.to_string(), x, y, z, a, b, c, d]);

@@ -1,6 +1,7 @@
 //! glTF 2.0, binary: a skinned tube with one joint an element for each thread, a node for each shape, one animation.
 //!
-//! Joints are no chain: all hang from one node at the origin, so that the path of a joint is that of the middle of its element.
+//! Joints are no chain: all hang from one node at the origin, so that the path of a joint is that of the middle of its
+//! element.
 
 use super::texture::braid;
 use super::{ExportError, Looks, Moment, Output, THREAD_COLORS, Writer, fitted};
@@ -13,7 +14,9 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::Checked::Valid;
 use gltf::json::validation::USize64;
-use gltf::json::{Accessor, Animation, Asset, Buffer, Image, Index, Material, Mesh, Node, Root, Scene, Skin, Texture, texture};
+use gltf::json::{
+    Accessor, Animation, Asset, Buffer, Image, Index, Material, Mesh, Node, Root, Scene, Skin, Texture, texture,
+};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use sutura::glam::DVec3;
@@ -42,9 +45,11 @@ struct Path {
 const SEEN: f32 = 1e-3;
 
 impl Path {
-    /// Adds a place; of the two quaternions of a rotation the one nearer to the last, so that between them it takes the short way.
+    /// Adds a place; of the two quaternions of a rotation the one nearer to the last, so that between them it takes the
+    /// short way.
     fn push(&mut self, position: [f32; 3], turn: [f32; 4]) {
-        let against = self.turns.last().is_some_and(|last| last.iter().zip(turn).map(|(a, b)| a * b).sum::<f32>() < 0.0);
+        let against =
+            self.turns.last().is_some_and(|last| last.iter().zip(turn).map(|(a, b)| a * b).sum::<f32>() < 0.0);
         self.positions.push(position);
         self.turns.push(if against { turn.map(|v| -v) } else { turn });
     }
@@ -79,19 +84,39 @@ impl Glb {
     fn animate(&self, doc: &mut Document, nodes: &[Index<Node>]) {
         let first = self.times[0];
         let times: Vec<[f32; 1]> = self.times.iter().map(|t| [(t - first) as f32]).collect();
-        let mut animation = Animation { extensions: None, extras: Default::default(), channels: Vec::new(), name: Some("run".into()), samplers: Vec::new() };
+        let mut animation = Animation {
+            extensions: None,
+            extras: Default::default(),
+            channels: Vec::new(),
+            name: Some("run".into()),
+            samplers: Vec::new(),
+        };
         let mut input = None;
         for (node, path) in nodes.iter().zip(&self.paths) {
-            let moves =
-                path.positions.iter().any(|x| *x != path.positions[0]).then(|| (Property::Translation, doc.accessor(Type::Vec3, None, &path.positions)));
-            let turns = path.turns.iter().any(|q| *q != path.turns[0]).then(|| (Property::Rotation, doc.accessor(Type::Vec4, None, &path.turns)));
+            let moves = path
+                .positions
+                .iter()
+                .any(|x| *x != path.positions[0])
+                .then(|| (Property::Translation, doc.accessor(Type::Vec3, None, &path.positions)));
+            let turns = path
+                .turns
+                .iter()
+                .any(|q| *q != path.turns[0])
+                .then(|| (Property::Rotation, doc.accessor(Type::Vec4, None, &path.turns)));
             let widens = path.is_scaled().then(|| (Property::Scale, doc.accessor(Type::Vec3, None, &path.scales)));
             for (property, output) in moves.into_iter().chain(turns).chain(widens) {
                 let input = *input.get_or_insert_with(|| doc.bounded(Type::Scalar, None, &times));
                 let sampler = Index::new(animation.samplers.len() as u32);
                 let interpolation = Valid(Interpolation::Linear);
-                animation.samplers.push(Sampler { extensions: None, extras: Default::default(), input, interpolation, output });
-                let target = Target { extensions: None, extras: Default::default(), node: *node, path: Valid(property) };
+                animation.samplers.push(Sampler {
+                    extensions: None,
+                    extras: Default::default(),
+                    input,
+                    interpolation,
+                    output,
+                });
+                let target =
+                    Target { extensions: None, extras: Default::default(), node: *node, path: Valid(property) };
                 animation.channels.push(Channel { sampler, target, extensions: None, extras: Default::default() });
             }
         }
@@ -131,11 +156,19 @@ impl Writer for Glb {
         for (k, (skin, name)) in self.looks.skins.iter().zip(&self.threads).enumerate() {
             let color = THREAD_COLORS[k % THREAD_COLORS.len()];
             let material = doc.material(name, color, 0.0, 0.55, texture, false);
-            let joints: Vec<Index<Node>> = (0..skin.n_bones()).zip(&mut paths).map(|(e, path)| doc.node(&format!("{name}.{e}"), path, None)).collect();
+            let joints: Vec<Index<Node>> = (0..skin.n_bones())
+                .zip(&mut paths)
+                .map(|(e, path)| doc.node(&format!("{name}.{e}"), path, None))
+                .collect();
             moving.extend(&joints);
-            let inverse: Vec<[f32; 16]> = skin.bind().iter().map(|z| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., -*z as f32, 1.]).collect();
+            let inverse: Vec<[f32; 16]> = skin
+                .bind()
+                .iter()
+                .map(|z| [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., -*z as f32, 1.])
+                .collect();
             let inverse = doc.accessor(Type::Mat4, None, &inverse);
-            let parent = doc.root.push(Node { name: Some(name.clone()), children: Some(joints.clone()), ..Node::default() });
+            let parent =
+                doc.root.push(Node { name: Some(name.clone()), children: Some(joints.clone()), ..Node::default() });
             let skin_index = doc.root.push(Skin {
                 extensions: None,
                 extras: Default::default(),
@@ -148,12 +181,18 @@ impl Writer for Glb {
             let weights = doc.accessor(Type::Vec4, Some(Use::ArrayBuffer), skin.weights());
             let more = [(Semantic::Joints(0), joints_accessor), (Semantic::Weights(0), weights)];
             let mesh = doc.mesh(name, skin.mesh(), material, &more);
-            let tube = doc.root.push(Node { name: Some(format!("{name}.skin")), mesh: Some(mesh), skin: Some(skin_index), ..Node::default() });
+            let tube = doc.root.push(Node {
+                name: Some(format!("{name}.skin")),
+                mesh: Some(mesh),
+                skin: Some(skin_index),
+                ..Node::default()
+            });
             turned.push(parent);
             scene_nodes.push(tube);
         }
         for ((mesh, (name, open)), path) in self.looks.shapes.iter().zip(&self.shapes).zip(&mut paths) {
-            let (color, metallic, roughness) = if *open { ([22, 86, 78], 0.0, 0.92) } else { ([219, 222, 227], 1.0, 0.3) };
+            let (color, metallic, roughness) =
+                if *open { ([22, 86, 78], 0.0, 0.92) } else { ([219, 222, 227], 1.0, 0.3) };
             let material = doc.material(name, color, metallic, roughness, None, *open);
             let mesh = doc.mesh(name, mesh, material, &[]);
             let node = doc.node(name, path, Some(mesh));
@@ -166,9 +205,15 @@ impl Writer for Glb {
         } else {
             let rotation = sutura::math::rotation_arc(self.up, DVec3::Y).as_quat().normalize();
             let rotation = Some(UnitQuaternion(rotation.to_array()));
-            scene_nodes.push(doc.root.push(Node { name: Some("upright".into()), children: Some(turned), rotation, ..Node::default() }));
+            scene_nodes.push(doc.root.push(Node {
+                name: Some("upright".into()),
+                children: Some(turned),
+                rotation,
+                ..Node::default()
+            }));
         }
-        let scene = doc.root.push(Scene { extensions: None, extras: Default::default(), name: None, nodes: scene_nodes });
+        let scene =
+            doc.root.push(Scene { extensions: None, extras: Default::default(), name: None, nodes: scene_nodes });
         doc.root.scene = Some(scene);
         out.write(None, &doc.into_glb()?)
     }
@@ -193,7 +238,13 @@ impl Document {
         })
     }
 
-    fn push_accessor(&mut self, view: Index<View>, count: usize, component: ComponentType, kind: Type) -> Index<Accessor> {
+    fn push_accessor(
+        &mut self,
+        view: Index<View>,
+        count: usize,
+        component: ComponentType,
+        kind: Type,
+    ) -> Index<Accessor> {
         self.root.push(Accessor {
             buffer_view: Some(view),
             byte_offset: None,
@@ -232,7 +283,13 @@ impl Document {
         self.push_accessor(view, values.len(), ComponentType::U16, kind)
     }
 
-    fn mesh(&mut self, name: &str, mesh: &TriangleMesh, material: Index<Material>, more: &[(Semantic, Index<Accessor>)]) -> Index<Mesh> {
+    fn mesh(
+        &mut self,
+        name: &str,
+        mesh: &TriangleMesh,
+        material: Index<Material>,
+        more: &[(Semantic, Index<Accessor>)],
+    ) -> Index<Mesh> {
         let vertices = Some(Use::ArrayBuffer);
         let mut attributes = BTreeMap::new();
         attributes.insert(Valid(Semantic::Positions), self.bounded(Type::Vec3, vertices, &mesh.positions));
@@ -241,7 +298,8 @@ impl Document {
             attributes.insert(Valid(Semantic::TexCoords(0)), self.accessor(Type::Vec2, vertices, &mesh.uvs));
         }
         attributes.extend(more.iter().map(|(semantic, accessor)| (Valid(semantic.clone()), *accessor)));
-        let view = self.view(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()), Some(Use::ElementArrayBuffer));
+        let view =
+            self.view(mesh.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()), Some(Use::ElementArrayBuffer));
         let indices = self.push_accessor(view, 3 * mesh.triangles.len(), ComponentType::U32, Type::Scalar);
         let primitive = Primitive {
             attributes,
@@ -252,7 +310,13 @@ impl Document {
             mode: Valid(Mode::Triangles),
             targets: None,
         };
-        self.root.push(Mesh { extensions: None, extras: Default::default(), name: Some(name.into()), primitives: vec![primitive], weights: None })
+        self.root.push(Mesh {
+            extensions: None,
+            extras: Default::default(),
+            name: Some(name.into()),
+            primitives: vec![primitive],
+            weights: None,
+        })
     }
 
     /// A node where a path begins.
@@ -265,24 +329,46 @@ impl Document {
     fn braid(&mut self) -> Index<Texture> {
         let view = self.view(braid().into_iter(), None);
         let mime_type = Some(gltf::json::image::MimeType("image/png".into()));
-        let image = Image { buffer_view: Some(view), mime_type, name: Some("braid".into()), uri: None, extensions: None, extras: Default::default() };
+        let image = Image {
+            buffer_view: Some(view),
+            mime_type,
+            name: Some("braid".into()),
+            uri: None,
+            extensions: None,
+            extras: Default::default(),
+        };
         let source = self.root.push(image);
         let sampler = self.root.push(texture::Sampler {
             mag_filter: Some(Valid(texture::MagFilter::Linear)),
             min_filter: Some(Valid(texture::MinFilter::LinearMipmapLinear)),
             ..texture::Sampler::default()
         });
-        self.root.push(Texture { name: None, sampler: Some(sampler), source, extensions: None, extras: Default::default() })
+        self.root.push(Texture {
+            name: None,
+            sampler: Some(sampler),
+            source,
+            extensions: None,
+            extras: Default::default(),
+        })
     }
 
-    fn material(&mut self, name: &str, srgb: [u8; 3], metallic: f32, roughness: f32, texture: Option<Index<Texture>>, double_sided: bool) -> Index<Material> {
+    fn material(
+        &mut self,
+        name: &str,
+        srgb: [u8; 3],
+        metallic: f32,
+        roughness: f32,
+        texture: Option<Index<Texture>>,
+        double_sided: bool,
+    ) -> Index<Material> {
         let linear = |v: u8| {
             let v = f64::from(v) / 255.0;
             // Colors of the format are linear; sRGB as in IEC 61966-2-1.
             if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
         };
         let [r, g, b] = srgb.map(|v| linear(v) as f32);
-        let base_color_texture = texture.map(|index| texture::Info { index, tex_coord: 0, extensions: None, extras: Default::default() });
+        let base_color_texture =
+            texture.map(|index| texture::Info { index, tex_coord: 0, extensions: None, extras: Default::default() });
         self.root.push(Material {
             name: Some(name.into()),
             double_sided,
@@ -299,11 +385,18 @@ impl Document {
 
     fn into_glb(mut self) -> Result<Vec<u8>, ExportError> {
         let length = USize64::from(self.bytes.len());
-        self.root.push(Buffer { byte_length: length, name: None, uri: None, extensions: None, extras: Default::default() });
+        self.root.push(Buffer {
+            byte_length: length,
+            name: None,
+            uri: None,
+            extensions: None,
+            extras: Default::default(),
+        });
         let json = self.root.to_vec().expect("a document in memory, with numbers that are finite");
         let padded = |n: usize| n.next_multiple_of(4);
         // Header, and two chunks with headers of their own.
-        let length = u32::try_from(12 + 8 + padded(json.len()) + 8 + padded(self.bytes.len())).map_err(|_| ExportError::TooLarge)?;
+        let length = u32::try_from(12 + 8 + padded(json.len()) + 8 + padded(self.bytes.len()))
+            .map_err(|_| ExportError::TooLarge)?;
         let header = gltf::binary::Header { magic: *b"glTF", version: 2, length };
         let glb = gltf::binary::Glb { header, json: Cow::Owned(json), bin: Some(Cow::Owned(self.bytes)) };
         glb.to_vec().map_err(|_| ExportError::TooLarge)

@@ -6,8 +6,8 @@ const SIDE: usize = 64;
 /// Strands that wind around the thread each way.
 const STRANDS: f64 = 4.0;
 
-/// A braid as a gray PNG that repeats both ways: strands at 45 degrees to the right over and under strands to the left, one of them dark, so that it is
-/// seen how the thread is twisted.
+/// A braid as a gray PNG that repeats both ways: strands at 45 degrees to the right over and under strands to the left,
+/// one of them dark, so that it is seen how the thread is twisted.
 pub fn braid() -> Vec<u8> {
     let mut pixels = Vec::with_capacity(SIDE * SIDE);
     for row in 0..SIDE {

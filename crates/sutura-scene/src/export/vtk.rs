@@ -1,7 +1,8 @@
-//! VTK PolyData (`.vtp`) of each moment with collections (`.pvd`) that say when: threads as polylines with fields, shapes as surfaces.
+//! VTK PolyData (`.vtp`) of each moment with collections (`.pvd`) that say when: threads as polylines with fields,
+//! shapes as surfaces.
 //!
-//! Names and fields are constants, so that nothing needs escaping, and the format is a dozen tags: the crates for VTK bring a parser of the old
-//! format and three compressors.
+//! Names and fields are constants, so that nothing needs escaping, and the format is a dozen tags: the crates for VTK
+//! bring a parser of the old format and three compressors.
 
 use super::{ExportError, Looks, Moment, Output, Strand, Writer};
 use crate::trajectory::{Header, Thread, ThreadLook};
@@ -42,7 +43,13 @@ impl Vtk {
     }
 
     fn surfaces(&self, moment: &Moment) -> PolyData {
-        let mut data = PolyData { points: Vec::new(), cells: Vec::new(), kind: "Polys", point_fields: Vec::new(), cell_fields: Vec::new() };
+        let mut data = PolyData {
+            points: Vec::new(),
+            cells: Vec::new(),
+            kind: "Polys",
+            point_fields: Vec::new(),
+            cell_fields: Vec::new(),
+        };
         let (mut normals, mut which) = (Vec::new(), Vec::new());
         for (k, (mesh, pose)) in self.looks.shapes.iter().zip(&moment.shapes).enumerate() {
             let first = (data.points.len() / 3) as i32;
@@ -84,7 +91,9 @@ impl Writer for Vtk {
             if files.is_empty() {
                 continue;
             }
-            let mut text = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n");
+            let mut text = String::from(
+                "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n<Collection>\n",
+            );
             for (time, file) in files {
                 let _ = writeln!(text, "<DataSet timestep=\"{time}\" part=\"0\" file=\"{file}\"/>");
             }
@@ -97,7 +106,13 @@ impl Writer for Vtk {
 
 /// All threads as polylines with their fields.
 fn threads(header: &Header, moment: &Moment) -> PolyData {
-    let mut data = PolyData { points: Vec::new(), cells: Vec::new(), kind: "Lines", point_fields: Vec::new(), cell_fields: Vec::new() };
+    let mut data = PolyData {
+        points: Vec::new(),
+        cells: Vec::new(),
+        kind: "Lines",
+        point_fields: Vec::new(),
+        cell_fields: Vec::new(),
+    };
     let mut fields: Vec<Field> = Vec::new();
     let mut which = Vec::new();
     for (k, (thread, strand)) in header.threads.iter().zip(&moment.threads).enumerate() {
@@ -137,10 +152,25 @@ fn fields_of(thread: &Thread, strand: &Strand) -> Vec<Field> {
         turn / (0.5 * (lengths[before] + lengths[after])).max(f64::MIN_POSITIVE)
     };
     let at_end = seam.map_or(DVec3::ZERO, |turn| joint(n - 1, 0, DQuat::from_rotation_z(-turn)));
-    let darboux: Vec<DVec3> = (0..=n).map(|i| if i == 0 || i == n { at_end } else { joint(i - 1, i, DQuat::IDENTITY) }).collect();
-    let around = |i: usize| if i == 0 || i == n { if seam.is_some() { (n - 1, 0) } else { (i.min(n - 1), i.min(n - 1)) } } else { (i - 1, i) };
-    let scalar = |name, value: &dyn Fn(usize) -> f64| Field { name, components: 1, values: (0..=n).map(|i| value(i) as f32).collect() };
-    let vector = |name, value: &dyn Fn(usize) -> DVec3| Field { name, components: 3, values: (0..=n).flat_map(|i| value(i).as_vec3().to_array()).collect() };
+    let darboux: Vec<DVec3> =
+        (0..=n).map(|i| if i == 0 || i == n { at_end } else { joint(i - 1, i, DQuat::IDENTITY) }).collect();
+    let around = |i: usize| {
+        if i == 0 || i == n {
+            if seam.is_some() { (n - 1, 0) } else { (i.min(n - 1), i.min(n - 1)) }
+        } else {
+            (i - 1, i)
+        }
+    };
+    let scalar = |name, value: &dyn Fn(usize) -> f64| Field {
+        name,
+        components: 1,
+        values: (0..=n).map(|i| value(i) as f32).collect(),
+    };
+    let vector = |name, value: &dyn Fn(usize) -> DVec3| Field {
+        name,
+        components: 3,
+        values: (0..=n).flat_map(|i| value(i).as_vec3().to_array()).collect(),
+    };
     let radius = radius(thread, look);
     let director = |axis: DVec3| {
         move |i: usize| {
@@ -180,8 +210,9 @@ fn radius(thread: &Thread, look: Option<&ThreadLook>) -> impl Fn(f64) -> f64 {
 
 impl PolyData {
     fn text(&self) -> String {
-        let mut text =
-            String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n");
+        let mut text = String::from(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt32\">\n",
+        );
         let (points, cells) = (self.points.len() / 3, self.cells.len());
         let (lines, polys) = if self.kind == "Lines" { (cells, 0) } else { (0, cells) };
         let _ = writeln!(
@@ -230,5 +261,8 @@ fn array(text: &mut String, kind: &str, name: &str, components: usize, values: i
     let length = (bytes.len() - 4) as u32;
     bytes[..4].copy_from_slice(&length.to_le_bytes());
     let data = base64::engine::general_purpose::STANDARD.encode(&bytes);
-    let _ = writeln!(text, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">{data}</DataArray>");
+    let _ = writeln!(
+        text,
+        "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"binary\">{data}</DataArray>"
+    );
 }

@@ -88,7 +88,8 @@ pub(super) fn eval(node: &Node, live: &dyn Live) -> Value {
                     _ => Value::Number(if *op == Op::Mul { x * y } else { x / y }),
                 },
                 Op::Eq | Op::Ne => {
-                    let missing = matches!(&a, Value::Number(v) if v.is_nan()) || matches!(&b, Value::Number(v) if v.is_nan());
+                    let missing =
+                        matches!(&a, Value::Number(v) if v.is_nan()) || matches!(&b, Value::Number(v) if v.is_nan());
                     let same = match (&a, &b) {
                         (Value::Text(a), Value::Text(b)) => texts_match(a, b) || texts_match(b, a),
                         _ => a == b,

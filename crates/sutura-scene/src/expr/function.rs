@@ -111,9 +111,18 @@ impl Wants {
     }
 }
 
-const WRENCH: &[(&str, Dim)] = &[("fx", Dim::FORCE), ("fy", Dim::FORCE), ("fz", Dim::FORCE), ("mx", Dim::TORQUE), ("my", Dim::TORQUE), ("mz", Dim::TORQUE)];
-const QUATERNION: &[(&str, Dim)] = &[("qx", Dim::NUMBER), ("qy", Dim::NUMBER), ("qz", Dim::NUMBER), ("qw", Dim::NUMBER)];
-const ENTRIES: &[(&str, Dim)] = &[("tail_a", Dim::LENGTH), ("loop_a", Dim::LENGTH), ("loop_b", Dim::LENGTH), ("tail_b", Dim::LENGTH)];
+const WRENCH: &[(&str, Dim)] = &[
+    ("fx", Dim::FORCE),
+    ("fy", Dim::FORCE),
+    ("fz", Dim::FORCE),
+    ("mx", Dim::TORQUE),
+    ("my", Dim::TORQUE),
+    ("mz", Dim::TORQUE),
+];
+const QUATERNION: &[(&str, Dim)] =
+    &[("qx", Dim::NUMBER), ("qy", Dim::NUMBER), ("qz", Dim::NUMBER), ("qw", Dim::NUMBER)];
+const ENTRIES: &[(&str, Dim)] =
+    &[("tail_a", Dim::LENGTH), ("loop_a", Dim::LENGTH), ("loop_b", Dim::LENGTH), ("tail_b", Dim::LENGTH)];
 
 pub(super) struct Function {
     pub name: &'static str,

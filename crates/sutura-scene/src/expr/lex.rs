@@ -31,7 +31,8 @@ pub(super) fn lex(text: &str) -> Result<Vec<Token>, Message> {
     while let Some(c) = rest.chars().next() {
         if c.is_ascii_digit() || (c == '.' && rest[1..].starts_with(|d: char| d.is_ascii_digit())) {
             let n = number_length(rest);
-            let value: f64 = rest[..n].replace('_', "").parse().map_err(|_| (format!("`{}` is not a number", &rest[..n]), None))?;
+            let value: f64 =
+                rest[..n].replace('_', "").parse().map_err(|_| (format!("`{}` is not a number", &rest[..n]), None))?;
             if !value.is_finite() {
                 return Err((format!("`{}` is too large", &rest[..n]), None));
             }
@@ -44,7 +45,9 @@ pub(super) fn lex(text: &str) -> Result<Vec<Token>, Message> {
             tokens.push(Token::Word(rest[..n].into()));
             rest = &rest[n..];
         } else if c == '\'' || c == '"' {
-            let Some(n) = rest[1..].find(c) else { return Err((format!("the text `{rest}` has no closing quote"), None)) };
+            let Some(n) = rest[1..].find(c) else {
+                return Err((format!("the text `{rest}` has no closing quote"), None));
+            };
             tokens.push(Token::Text(rest[1..=n].into()));
             rest = &rest[n + 2..];
         } else if let Some(mark) = MARKS.iter().find(|m| rest.starts_with(**m)) {
@@ -63,8 +66,8 @@ pub(super) fn lex(text: &str) -> Result<Vec<Token>, Message> {
     Ok(tokens)
 }
 
-/// The unit that follows a number: factors joined by spaces or `*`, `/` before a factor divides. Returns size, dimension and bytes used.
-/// A word that is no unit ends it, so `2 N and ..` and `2 * x` read as expected.
+/// The unit that follows a number: factors joined by spaces or `*`, `/` before a factor divides. Returns size,
+/// dimension and bytes used. A word that is no unit ends it, so `2 N and ..` and `2 * x` read as expected.
 fn unit_after(text: &str) -> ((f64, Dim), usize) {
     let (mut size, mut dim, mut used) = (1.0, Dim::NUMBER, 0);
     let mut first = true;
@@ -84,7 +87,9 @@ fn unit_after(text: &str) -> ((f64, Dim), usize) {
         let n = piece.find(|c: char| !(c.is_alphabetic() || c == '%' || c == '°')).unwrap_or(piece.len());
         // `2 x(..)` or `2 mm_` would not be units.
         let next = piece[n..].chars().next();
-        let Some(unit) = symbol(&piece[..n]).filter(|_| !matches!(next, Some('(' | '_' | '0'..='9'))) else { return ((size, dim), used) };
+        let Some(unit) = symbol(&piece[..n]).filter(|_| !matches!(next, Some('(' | '_' | '0'..='9'))) else {
+            return ((size, dim), used);
+        };
         let mut power: i8 = if divide { -1 } else { 1 };
         let mut end = at + n;
         if let Some(digits) = piece[n..].strip_prefix('^') {

@@ -15,7 +15,10 @@ const MAX_TOKENS: usize = 1000;
 pub(super) fn parse(text: &str, names: &Names) -> Result<Expr, Message> {
     let tokens = lex(text)?;
     if tokens.len() > MAX_TOKENS {
-        return Err((format!("the expression has {} words and marks, at most {MAX_TOKENS} are read", tokens.len()), None));
+        return Err((
+            format!("the expression has {} words and marks, at most {MAX_TOKENS} are read", tokens.len()),
+            None,
+        ));
     }
     let mut parser = Parser { tokens, at: 0, names, depth: 0 };
     let (node, kind) = parser.or()?;
@@ -105,7 +108,9 @@ impl Parser<'_> {
         let right = self.sum()?;
         let equality = matches!(op, Op::Eq | Op::Ne);
         let fine = match (&left.1, &right.1) {
-            (Kind::Number(a) | Kind::Vector(a), Kind::Number(b)) | (Kind::Number(a), Kind::Vector(b)) => a.same_kind(*b),
+            (Kind::Number(a) | Kind::Vector(a), Kind::Number(b)) | (Kind::Number(a), Kind::Vector(b)) => {
+                a.same_kind(*b)
+            }
             (Kind::Vector(a), Kind::Vector(b)) => equality && a.same_kind(*b),
             (Kind::Truth, Kind::Truth) | (Kind::Text, Kind::Text) => equality,
             _ => false,
@@ -150,7 +155,9 @@ impl Parser<'_> {
                 (Kind::Number(a), Kind::Number(b)) => Kind::Number(combine(*a, *b)),
                 (Kind::Vector(a), Kind::Number(b)) => Kind::Vector(combine(*a, *b)),
                 (Kind::Number(a), Kind::Vector(b)) if op == Op::Mul => Kind::Vector(combine(*a, *b)),
-                (a, b) => return Err((format!("{} and {} cannot be multiplied or divided", a.words(), b.words()), None)),
+                (a, b) => {
+                    return Err((format!("{} and {} cannot be multiplied or divided", a.words(), b.words()), None));
+                }
             };
             left = (Node::Binary(op, Box::new(left.0), Box::new(right.0)), kind);
         }
@@ -172,7 +179,9 @@ impl Parser<'_> {
     fn postfix(&mut self) -> Parsed {
         let (mut node, mut kind) = self.primary()?;
         while self.mark(".") {
-            let Some(Token::Word(part)) = self.next() else { return Err(("a component such as `x` is expected after `.`".into(), None)) };
+            let Some(Token::Word(part)) = self.next() else {
+                return Err(("a component such as `x` is expected after `.`".into(), None));
+            };
             let (index, dim) = match &kind {
                 Kind::Vector(d) => (["x", "y", "z"].iter().position(|p| *p == part), *d),
                 Kind::Columns(c) => {
@@ -182,7 +191,11 @@ impl Parser<'_> {
                 other => return Err((format!("{} has no component `{part}`", other.words()), None)),
             };
             let Some(index) = index else {
-                let known: Vec<&str> = if let Kind::Columns(c) = &kind { c.iter().map(|(n, _)| *n).collect() } else { vec!["x", "y", "z"] };
+                let known: Vec<&str> = if let Kind::Columns(c) = &kind {
+                    c.iter().map(|(n, _)| *n).collect()
+                } else {
+                    vec!["x", "y", "z"]
+                };
                 return Err((format!("there is no component `{part}`"), Some(format!("known: {}", known.join(", ")))));
             };
             node = Node::Pick(Box::new(node), index);
@@ -219,7 +232,9 @@ impl Parser<'_> {
                 self.expect(",")?;
             }
             let (node, kind) = self.sum()?;
-            let Kind::Number(d) = kind else { return Err((format!("a vector is made of numbers, found {}", kind.words()), None)) };
+            let Kind::Number(d) = kind else {
+                return Err((format!("a vector is made of numbers, found {}", kind.words()), None));
+            };
             if *dim.get_or_insert(d) != d {
                 return Err(("the components of a vector must have one dimension".into(), None));
             }
@@ -237,7 +252,9 @@ impl Parser<'_> {
             dim = dim.times(unit.dim);
         }
         let scale = |n: Node| Node::Binary(Op::Mul, Box::new(n), Box::new(Node::Constant(Value::Number(size))));
-        let Ok(parts) = <[Node; 3]>::try_from(parts) else { return Err(("a vector has three components".into(), None)) };
+        let Ok(parts) = <[Node; 3]>::try_from(parts) else {
+            return Err(("a vector has three components".into(), None));
+        };
         Ok((Node::Vector(Box::new(parts.map(scale))), Kind::Vector(dim)))
     }
     fn named(&self, word: &str) -> Parsed {
@@ -246,11 +263,18 @@ impl Parser<'_> {
                 let kind = self.names.probes.get(i).cloned().unwrap_or(Kind::Number(Dim::NUMBER));
                 Ok((Node::Probe(i), kind))
             }
-            Some(_) => Err((format!("`{word}` is a thing, not a value"), Some(format!("ask for something of it, for instance `position({word})`")))),
+            Some(_) => Err((
+                format!("`{word}` is a thing, not a value"),
+                Some(format!("ask for something of it, for instance `position({word})`")),
+            )),
             None => {
-                let functions: Vec<String> = FUNCTIONS.iter().filter(|f| f.least == 0).map(|f| format!("{}()", f.name)).collect();
+                let functions: Vec<String> =
+                    FUNCTIONS.iter().filter(|f| f.least == 0).map(|f| format!("{}()", f.name)).collect();
                 if FUNCTIONS.iter().any(|f| f.name == word) {
-                    return Err((format!("`{word}` is a function"), Some(format!("write `{word}()` with its arguments"))));
+                    return Err((
+                        format!("`{word}` is a function"),
+                        Some(format!("write `{word}()` with its arguments")),
+                    ));
                 }
                 let mut known: Vec<&str> = self.names.which(|n| matches!(n, Named::Probe(_)));
                 known.extend(functions.iter().map(String::as_str));
@@ -272,7 +296,9 @@ impl Parser<'_> {
             if !args.is_empty() {
                 self.expect(",")?;
             }
-            let Some(wants) = function.wants.get(args.len()) else { return Err((format!("`{name}` takes {} argument(s)", function.wants.len()), None)) };
+            let Some(wants) = function.wants.get(args.len()) else {
+                return Err((format!("`{name}` takes {} argument(s)", function.wants.len()), None));
+            };
             args.push(self.reference(name, *wants)?);
         }
         if args.len() < function.least {
@@ -301,10 +327,17 @@ impl Parser<'_> {
         if args.len() != count {
             return Err((format!("`{name}` takes {count} argument(s), found {}", args.len()), None));
         }
-        let wrong = || Err((format!("`{name}` cannot take {}", kinds.iter().map(Kind::words).collect::<Vec<_>>().join(" and ")), None));
+        let wrong = || {
+            Err((
+                format!("`{name}` cannot take {}", kinds.iter().map(Kind::words).collect::<Vec<_>>().join(" and ")),
+                None,
+            ))
+        };
         let kind = match (maths, kinds.as_slice()) {
             (Maths::Abs, [Kind::Number(d)]) | (Maths::Norm, [Kind::Vector(d)]) => Kind::Number(*d),
-            (Maths::Sin | Maths::Cos | Maths::Exp | Maths::Ln, [Kind::Number(d)]) if d.same_kind(Dim::NUMBER) => Kind::Number(Dim::NUMBER),
+            (Maths::Sin | Maths::Cos | Maths::Exp | Maths::Ln, [Kind::Number(d)]) if d.same_kind(Dim::NUMBER) => {
+                Kind::Number(Dim::NUMBER)
+            }
             (Maths::Sqrt, [Kind::Number(d)]) if d.m % 2 == 0 && d.kg % 2 == 0 && d.s % 2 == 0 => {
                 Kind::Number(Dim { m: d.m / 2, kg: d.kg / 2, s: d.s / 2, rad: 0 })
             }
@@ -316,9 +349,12 @@ impl Parser<'_> {
         };
         Ok((Node::Maths(maths, args), kind))
     }
-    /// An argument that names a thread, grip, shape, or a place on a thread: `silk.end`, `silk.particle[3]`, `silk[35 mm]`.
+    /// An argument that names a thread, grip, shape, or a place on a thread: `silk.end`, `silk.particle[3]`, `silk[35
+    /// mm]`.
     fn reference(&mut self, function: &str, wants: Wants) -> Result<Ref, Message> {
-        let Some(Token::Word(word)) = self.next() else { return Err((format!("`{function}` needs the name of a thing"), None)) };
+        let Some(Token::Word(word)) = self.next() else {
+            return Err((format!("`{function}` needs the name of a thing"), None));
+        };
         let reference = match self.names.get(&word) {
             Some(Named::Thread(t)) => self.place_on(t, &word)?,
             Some(Named::Grip(g)) => Ref::Grip(g),
@@ -338,7 +374,12 @@ impl Parser<'_> {
         if self.mark("[") {
             let arc = match self.next() {
                 Some(Token::Quantity(q, _)) if Dim::LENGTH.accepts(q.dim) || q.dim == Dim::NUMBER => q.value,
-                _ => return Err((format!("`{name}[..]` wants a length from the start, for instance `{name}[35 mm]`"), None)),
+                _ => {
+                    return Err((
+                        format!("`{name}[..]` wants a length from the start, for instance `{name}[35 mm]`"),
+                        None,
+                    ));
+                }
             };
             self.expect("]")?;
             return Ok(Ref::On(thread, At::Arc(arc)));
@@ -347,7 +388,10 @@ impl Parser<'_> {
             return Ok(Ref::Thread(thread));
         }
         let Some(Token::Word(part)) = self.next() else {
-            return Err((format!("a place is expected after `{name}.`"), Some("start, middle, end, particle[3], element[3]".into())));
+            return Err((
+                format!("a place is expected after `{name}.`"),
+                Some("start, middle, end, particle[3], element[3]".into()),
+            ));
         };
         let at = match part.as_str() {
             "start" => At::Start,
@@ -356,13 +400,20 @@ impl Parser<'_> {
             "particle" | "element" => {
                 self.expect("[")?;
                 let index = match self.next() {
-                    Some(Token::Quantity(q, _)) if q.dim == Dim::NUMBER && q.value.fract() == 0.0 && q.value < 1e9 => q.value as u32,
+                    Some(Token::Quantity(q, _)) if q.dim == Dim::NUMBER && q.value.fract() == 0.0 && q.value < 1e9 => {
+                        q.value as u32
+                    }
                     _ => return Err((format!("`{part}[..]` wants a whole number"), None)),
                 };
                 self.expect("]")?;
                 if part == "particle" { At::Particle(index) } else { At::Element(index) }
             }
-            other => return Err((format!("`{other}` is not a place on a thread"), suggest(other, ["start", "middle", "end", "particle", "element"]))),
+            other => {
+                return Err((
+                    format!("`{other}` is not a place on a thread"),
+                    suggest(other, ["start", "middle", "end", "particle", "element"]),
+                ));
+            }
         };
         Ok(Ref::On(thread, at))
     }

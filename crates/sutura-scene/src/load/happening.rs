@@ -19,8 +19,10 @@ impl<'d> Loader<'d> {
         let condition = table.get("until").map(|v| self.condition(&v));
         let at_most = positive(table, "max_duration", Dim::TIME);
         let at_least = in_range(table, "min_duration", Dim::TIME, 0.0, 1e9).unwrap_or(0.0);
-        let late =
-            table.get("out_of_time").and_then(|v| v.choice(&[("stop", Late::Stop), ("fail", Late::Fail), ("accept", Late::Accept)])).unwrap_or(Late::Fail);
+        let late = table
+            .get("out_of_time")
+            .and_then(|v| v.choice(&[("stop", Late::Stop), ("fail", Late::Fail), ("accept", Late::Accept)]))
+            .unwrap_or(Late::Fail);
         let save = table.text("save").map(std::borrow::Cow::into_owned);
         if let Some(file) = &save
             && (file.is_empty() || file.contains(['/', '\\']))
@@ -38,7 +40,9 @@ impl<'d> Loader<'d> {
                     Vec::new()
                 }
             }
-            Some(v) if v.is_array() => v.array("names of threads")?.iter().filter_map(|v| self.find_thread(v)).collect(),
+            Some(v) if v.is_array() => {
+                v.array("names of threads")?.iter().filter_map(|v| self.find_thread(v)).collect()
+            }
             Some(v) => self.find_thread(&v).into_iter().collect(),
         };
         if duration.is_some()
@@ -52,12 +56,22 @@ impl<'d> Loader<'d> {
             Action::Load { ramp, .. } | Action::Gravity { ramp, .. } => *ramp > 0.0,
             _ => false,
         };
-        if duration.is_none() && condition.is_none() && at_least == 0.0 && !table.has("duration") && !actions.iter().any(takes_time) {
-            table.problem("when does it end? it has neither `duration`, `until`, nor a motion or ramp to wait for", None);
+        if duration.is_none()
+            && condition.is_none()
+            && at_least == 0.0
+            && !table.has("duration")
+            && !actions.iter().any(takes_time)
+        {
+            table.problem(
+                "when does it end? it has neither `duration`, `until`, nor a motion or ramp to wait for",
+                None,
+            );
         }
         let end = match (duration, condition) {
             (Some(d), _) => End::After(d),
-            (None, Some(c)) => End::When { condition: Some(c?), at_least, at_most: at_most.unwrap_or(DEFAULT_MAX_DURATION), late },
+            (None, Some(c)) => {
+                End::When { condition: Some(c?), at_least, at_most: at_most.unwrap_or(DEFAULT_MAX_DURATION), late }
+            }
             // Motions end by themselves.
             (None, None) => End::When { condition: None, at_least, at_most: at_most.unwrap_or(f64::INFINITY), late },
         };
@@ -65,8 +79,12 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
-        const VERBS: [&str; 13] = ["take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction", "material", "reel"];
-        let found: Vec<(&str, Value<'d>)> = VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
+        const VERBS: [&str; 13] = [
+            "take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction",
+            "material", "reel",
+        ];
+        let found: Vec<(&str, Value<'d>)> =
+            VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
         let [(verb, value)] = found.as_slice() else {
             table.finish();
             let message = if found.is_empty() { "the action does nothing" } else { "one action at a time" };
@@ -85,7 +103,10 @@ impl<'d> Loader<'d> {
             "gravity" => value.vector(Dim::ACCELERATION).map(|v| Action::Gravity { value: v, ramp: ramp(table, 0.0) }),
             "reel" => self.find_reel(value).zip(reel_law(table)).map(|(reel, law)| Action::Reel { reel, law }),
             "material" => self.find_thread(value).map(|thread| Action::Remake { thread, change: remake(table) }),
-            "friction" => self.two_surfaces(value).zip(coefficients(table)).map(|((a, b), friction)| Action::Friction { a, b, friction }),
+            "friction" => self
+                .two_surfaces(value)
+                .zip(coefficients(table))
+                .map(|((a, b), friction)| Action::Friction { a, b, friction }),
             _ => value.table().map(|t| {
                 let has = |key: &str| t.has(key);
                 let mut s = Settings::default();
@@ -115,8 +136,14 @@ impl<'d> Loader<'d> {
             self.reels.iter().position(|r| self.threads[r.thread].name == thread && r.at_end == at_end)
         });
         if found.is_none() {
-            let all = self.reels.iter().map(|r| format!("{}.{}", self.threads[r.thread].name, if r.at_end { "end" } else { "start" }));
-            value.problem(format!("there is no reel at `{text}`"), Some(format!("reels: {}", all.collect::<Vec<_>>().join(", "))));
+            let all = self
+                .reels
+                .iter()
+                .map(|r| format!("{}.{}", self.threads[r.thread].name, if r.at_end { "end" } else { "start" }));
+            value.problem(
+                format!("there is no reel at `{text}`"),
+                Some(format!("reels: {}", all.collect::<Vec<_>>().join(", "))),
+            );
         }
         found
     }
@@ -151,7 +178,8 @@ impl<'d> Loader<'d> {
                 "end" => At::End,
                 "middle" => At::Middle,
                 _ => {
-                    let number = |prefix: &str| text.strip_prefix(prefix).and_then(|rest| rest.trim().parse::<u32>().ok());
+                    let number =
+                        |prefix: &str| text.strip_prefix(prefix).and_then(|rest| rest.trim().parse::<u32>().ok());
                     if let Some(i) = number("particle ") {
                         At::Particle(i)
                     } else if let Some(i) = number("element ") {
@@ -207,7 +235,12 @@ impl<'d> Loader<'d> {
         let ramp = ramp(table, 0.0);
         if let Some(v) = table.get("force_per_length") {
             let force_per_length = v.vector(Dim::STIFFNESS);
-            return Some(Action::Load { load, thread: thread?, kind: LoadDef::Uniform { force_per_length: force_per_length? }, ramp });
+            return Some(Action::Load {
+                load,
+                thread: thread?,
+                kind: LoadDef::Uniform { force_per_length: force_per_length? },
+                ramp,
+            });
         }
         let place = table.need("at", "where along the thread (or `force_per_length` for all of it)");
         let place = thread.zip(place).and_then(|(thread, v)| self.place(&v, thread));
@@ -231,15 +264,19 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn plan(&self, table: &Table<'d>) -> Option<Plan> {
-        let ease =
-            table.get("path").and_then(|v| v.choice(&[("smooth", Ease::Smooth), ("linear", Ease::Linear), ("spline", Ease::Spline)])).unwrap_or(Ease::Smooth);
+        let ease = table
+            .get("path")
+            .and_then(|v| v.choice(&[("smooth", Ease::Smooth), ("linear", Ease::Linear), ("spline", Ease::Spline)]))
+            .unwrap_or(Ease::Smooth);
         let relative = match table.get("relative_to") {
             None => Some(Relative::World),
             Some(v) => match v.text()?.as_ref() {
                 "world" => Some(Relative::World),
                 "start" => Some(Relative::Start),
                 "taken" => Some(Relative::Taken),
-                _ => self.find(&v, "shape (or: world, start, taken)", |n| if let Named::Shape(i) = n { Some(Relative::Shape(i)) } else { None }),
+                _ => self.find(&v, "shape (or: world, start, taken)", |n| {
+                    if let Named::Shape(i) = n { Some(Relative::Shape(i)) } else { None }
+                }),
             },
         };
         let along = match table.get("orientation") {
@@ -286,8 +323,10 @@ impl<'d> Loader<'d> {
             v.vector(Dim::LENGTH).map(Goal::By)
         } else if let Some(v) = t.get("around") {
             v.table().and_then(|a| {
-                let (center, axis) = (a.need_vector("center", Dim::LENGTH), a.need("axis", "a direction").and_then(|v| v.direction()));
-                let (angle, advance) = (a.need_quantity("angle", Dim::ANGLE), a.quantity_or("advance", Dim::LENGTH, 0.0));
+                let (center, axis) =
+                    (a.need_vector("center", Dim::LENGTH), a.need("axis", "a direction").and_then(|v| v.direction()));
+                let (angle, advance) =
+                    (a.need_quantity("angle", Dim::ANGLE), a.quantity_or("advance", Dim::LENGTH, 0.0));
                 let carry = a.truth_or("carry", false);
                 a.finish();
                 Some(Goal::Around { center: center?, axis: axis?, angle: angle?, advance, carry })
@@ -297,7 +336,8 @@ impl<'d> Loader<'d> {
         };
         let turning = if let Some(v) = t.get("turn") {
             v.table().and_then(|a| {
-                let (axis, angle) = (a.need("axis", "a direction").and_then(|v| v.direction()), a.need_quantity("angle", Dim::ANGLE));
+                let (axis, angle) =
+                    (a.need("axis", "a direction").and_then(|v| v.direction()), a.need_quantity("angle", Dim::ANGLE));
                 a.finish();
                 Some(Turning::By(axis? * angle?))
             })
@@ -309,7 +349,11 @@ impl<'d> Loader<'d> {
             Some(Turning::Keep)
         };
         let own_speed = positive(t, "speed", Dim::SPEED);
-        let when = match (in_range(t, "time", Dim::TIME, 0.0, 1e9), in_range(t, "duration", Dim::TIME, 0.0, 1e9), own_speed.or(speed)) {
+        let when = match (
+            in_range(t, "time", Dim::TIME, 0.0, 1e9),
+            in_range(t, "duration", Dim::TIME, 0.0, 1e9),
+            own_speed.or(speed),
+        ) {
             (Some(time), None, _) => Some(When::At(time)),
             (None, Some(d), _) => Some(When::After(d)),
             (Some(_), Some(_), _) => {
@@ -327,7 +371,8 @@ impl<'d> Loader<'d> {
         Some(Key { goal: goal?, turning: turning?, when: when? })
     }
 
-    /// A grip must be taken before it is moved or let go, a load set before it is taken off. Grips of a saved state may hold or not.
+    /// A grip must be taken before it is moved or let go, a load set before it is taken off. Grips of a saved state may
+    /// hold or not.
     pub(super) fn check_order(&self, initial: &[Step], phases: &[Phase], from_saved: bool) {
         let mut held = vec![if from_saved { None } else { Some(false) }; self.grips.len()];
         let mut loaded = vec![if from_saved { None } else { Some(false) }; self.loads.len()];

@@ -3,14 +3,17 @@
 use super::*;
 use crate::scene::Remake;
 
-/// Most elements of all threads together: far beyond what runs in real time, and a slip of the pen must not fill the memory or cut a
-/// centerline for minutes.
+/// Most elements of all threads together: far beyond what runs in real time, and a slip of the pen must not fill the
+/// memory or cut a centerline for minutes.
 const MAX_ELEMENTS: usize = 50_000;
 
 impl<'d> Loader<'d> {
     pub(super) fn thread(&mut self, table: &Table<'d>) {
         let index = self.threads.len();
-        let name = table.need("name", "the name of the thread").and_then(|v| v.text()).map_or(format!("thread{index}"), std::borrow::Cow::into_owned);
+        let name = table
+            .need("name", "the name of the thread")
+            .and_then(|v| v.text())
+            .map_or(format!("thread{index}"), std::borrow::Cow::into_owned);
         let shape = self.cross_section(table);
         let material = self.material(table);
         let stretch = stretch(table);
@@ -20,13 +23,16 @@ impl<'d> Loader<'d> {
         let points = self.centerline(table, None);
         let hint = table.vector("d1", Dim::NUMBER);
         let twist = table.quantity_or("twist", Dim::ANGLE, 0.0);
-        let (roll, pretwist) = (table.quantity_or("roll", Dim::ANGLE, 0.0), table.quantity_or("pretwist", Dim::ANGLE, 0.0));
+        let (roll, pretwist) =
+            (table.quantity_or("roll", Dim::ANGLE, 0.0), table.quantity_or("pretwist", Dim::ANGLE, 0.0));
         let closed = table.truth_or("closed", false);
         if closed && let Some(v) = table.get("d1") {
             v.problem("a closed thread turns its section by `roll`", None);
         }
         let rest_value = table.get("rest");
-        let (Some(points), Some((section, radius, size)), Some((material, modulus, density))) = (points, shape, material) else {
+        let (Some(points), Some((section, radius, size)), Some((material, modulus, density))) =
+            (points, shape, material)
+        else {
             // What is missing was reported; a stand-in keeps the numbers of the following threads right.
             if let Some(rest) = rest_value {
                 let _ = self.rest(&rest, 1, closed);
@@ -35,7 +41,13 @@ impl<'d> Loader<'d> {
             self.threads.push(ThreadDef { name, spec, location: table.location(), knot, strength });
             return;
         };
-        let mut spec = RodSpec { section, roll, pretwist, along: Along { size, modulus, density }, ..RodSpec::new(points, radius, material) };
+        let mut spec = RodSpec {
+            section,
+            roll,
+            pretwist,
+            along: Along { size, modulus, density },
+            ..RodSpec::new(points, radius, material)
+        };
         spec.stretch = stretch.unwrap_or(Stretch::Elastic);
         spec.surface = surface;
         if closed {
@@ -83,7 +95,10 @@ impl<'d> Loader<'d> {
                 value.problem("`section_scale` and a radius along the thread exclude each other", None);
             } else if varies && section != Section::Round {
                 let value = table.get("radius").or(table.get("diameter"))?;
-                value.problem("a section that is not round touches with one radius", Some("`section_scale` changes its size along the thread".into()));
+                value.problem(
+                    "a section that is not round touches with one radius",
+                    Some("`section_scale` changes its size along the thread".into()),
+                );
             }
             let radius = if section == Section::Round { radius * largest } else { radius };
             Some((section, radius, if varies { profile } else { scale }))
@@ -107,7 +122,8 @@ impl<'d> Loader<'d> {
                 None
             }
         });
-        let e = along(table, "young_modulus", Dim::PRESSURE).or(preset.map(|p| (p.young_modulus.value, Profile::default())));
+        let e = along(table, "young_modulus", Dim::PRESSURE)
+            .or(preset.map(|p| (p.young_modulus.value, Profile::default())));
         let density = along(table, "density", Dim::DENSITY).or(preset.map(|p| (p.density.value, Profile::default())));
         let shear = shear(table);
         let bend_scale = bend_scale(table).or(preset.map(|p| p.bend_scale.value)).unwrap_or(1.0);
@@ -115,14 +131,21 @@ impl<'d> Loader<'d> {
         let plasticity = table.get("plasticity").and_then(|v| plasticity(&v));
         let (Some((young_modulus, modulus_along)), Some((density, density_along))) = (e, density) else {
             if !failed && !table.has("young_modulus") {
-                table.problem("`material` or `young_modulus` is missing", Some(format!("materials: {}", names_of_materials())));
+                table.problem(
+                    "`material` or `young_modulus` is missing",
+                    Some(format!("materials: {}", names_of_materials())),
+                );
             } else if !failed && !table.has("density") {
                 table.problem("`density` is missing (or name a `material`)", None);
             }
             return None;
         };
         let shear = shear.unwrap_or(Shear::Poisson(preset.map_or(0.4, |p| p.poisson_ratio.value)));
-        Some((Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity }, modulus_along, density_along))
+        Some((
+            Material { young_modulus, shear, density, bend_scale, bend_damping, plasticity },
+            modulus_along,
+            density_along,
+        ))
     }
 
     /// The particles of a thread (or of a rest shape with a given number of elements).
@@ -134,7 +157,13 @@ impl<'d> Loader<'d> {
                 let n = v.integer(1, MAX_ELEMENTS as i64)? as usize;
                 let before: usize = self.threads.iter().map(|t| t.spec.centerline.len() - 1).sum();
                 if before + n > MAX_ELEMENTS {
-                    v.problem(format!("{} elements with those of the threads before it, at most {MAX_ELEMENTS} are taken", before + n), None);
+                    v.problem(
+                        format!(
+                            "{} elements with those of the threads before it, at most {MAX_ELEMENTS} are taken",
+                            before + n
+                        ),
+                        None,
+                    );
                     return None;
                 }
                 Some(n)
@@ -152,7 +181,8 @@ impl<'d> Loader<'d> {
             let to = match (t.get("to"), t.get("direction")) {
                 (Some(to), None) => to.vector(Dim::LENGTH),
                 (None, Some(d)) => {
-                    let (d, length) = (d.direction(), t.need("length", "a length").and_then(|v| positive_value(&v, Dim::LENGTH)));
+                    let (d, length) =
+                        (d.direction(), t.need("length", "a length").and_then(|v| positive_value(&v, Dim::LENGTH)));
                     from.zip(d).zip(length).map(|((from, d), l)| from + d * l)
                 }
                 _ => {
@@ -164,16 +194,23 @@ impl<'d> Loader<'d> {
             Curve::new(vec![Piece::Line { from: from?, to: to? }])
         } else if table.has("arc") {
             let t = shape.table()?;
-            let (center, axis, start) =
-                (t.need_vector("center", Dim::LENGTH), t.need("axis", "a direction").and_then(|v| v.direction()), t.need_vector("start", Dim::LENGTH));
+            let (center, axis, start) = (
+                t.need_vector("center", Dim::LENGTH),
+                t.need("axis", "a direction").and_then(|v| v.direction()),
+                t.need_vector("start", Dim::LENGTH),
+            );
             let angle = t.need_quantity("angle", Dim::ANGLE);
             t.finish();
             Curve::new(vec![curve::turn(start?, center?, axis?, angle?, 0.0)])
         } else if table.has("helix") {
             let t = shape.table()?;
-            let (center, axis, start) =
-                (t.need_vector("center", Dim::LENGTH), t.need("axis", "a direction").and_then(|v| v.direction()), t.need_vector("start", Dim::LENGTH));
-            let (pitch, turns) = (t.need_quantity("pitch", Dim::LENGTH), t.get("turns").and_then(|v| v.quantity(Dim::NUMBER)));
+            let (center, axis, start) = (
+                t.need_vector("center", Dim::LENGTH),
+                t.need("axis", "a direction").and_then(|v| v.direction()),
+                t.need_vector("start", Dim::LENGTH),
+            );
+            let (pitch, turns) =
+                (t.need_quantity("pitch", Dim::LENGTH), t.get("turns").and_then(|v| v.quantity(Dim::NUMBER)));
             let length = positive(&t, "length", Dim::LENGTH);
             if turns.is_some() == length.is_some() {
                 t.problem("either `turns` or `length` of the thread", None);
@@ -214,7 +251,11 @@ impl<'d> Loader<'d> {
     /// Points inline, or `{ file = "..", unit = "mm" }`.
     pub(super) fn points(&self, value: &Value<'d>) -> Option<Vec<DVec3>> {
         if !value.is_table() {
-            return value.array("an array of points, or { file = \"..\", unit = \"mm\" }")?.iter().map(|v| v.vector(Dim::LENGTH)).collect();
+            return value
+                .array("an array of points, or { file = \"..\", unit = \"mm\" }")?
+                .iter()
+                .map(|v| v.vector(Dim::LENGTH))
+                .collect();
         }
         let t = value.table()?;
         let unit = file_unit(&t);
@@ -247,10 +288,16 @@ impl<'d> Loader<'d> {
                 v.vector(Dim::LENGTH).zip(here).map(|(by, from)| Piece::Line { from, to: from + by })
             } else if let Some(v) = t.get("arc") {
                 let a = v.table()?;
-                let (center, axis) = (a.need_vector("center", Dim::LENGTH), a.need("axis", "a direction").and_then(|v| v.direction()));
-                let (angle, advance) = (a.need_quantity("angle", Dim::ANGLE), a.quantity_or("advance", Dim::LENGTH, 0.0));
+                let (center, axis) =
+                    (a.need_vector("center", Dim::LENGTH), a.need("axis", "a direction").and_then(|v| v.direction()));
+                let (angle, advance) =
+                    (a.need_quantity("angle", Dim::ANGLE), a.quantity_or("advance", Dim::LENGTH, 0.0));
                 a.finish();
-                center.zip(axis).zip(angle).zip(here).map(|(((center, axis), angle), start)| curve::turn(start, center, axis, angle, advance))
+                center
+                    .zip(axis)
+                    .zip(angle)
+                    .zip(here)
+                    .map(|(((center, axis), angle), start)| curve::turn(start, center, axis, angle, advance))
             } else {
                 item.problem("a piece is one of: line_to, line_by, arc", None);
                 None
@@ -285,17 +332,21 @@ impl<'d> Loader<'d> {
             let lengths: Vec<f64> = points.windows(2).map(|p| p[0].distance(p[1])).collect();
             let joints = if closed { n } else { n - 1 };
             let next = |j: usize| (j + 1) % n;
-            let darboux = (0..joints).map(|j| log((q[j].conjugate() * q[next(j)]).normalize()) / (0.5 * (lengths[j] + lengths[next(j)]))).collect();
+            let darboux = (0..joints)
+                .map(|j| log((q[j].conjugate() * q[next(j)]).normalize()) / (0.5 * (lengths[j] + lengths[next(j)])))
+                .collect();
             return Some(RestShape::Given { lengths: Some(lengths), darboux: Some(darboux) });
         }
         let curvature = match t.get("curvature") {
-            Some(v) if v.is_array() => match v.quantities(Dim::CURVATURE, "two curvatures, about d1 and d2")?.as_slice() {
-                [a, b] => Some((*a, *b)),
-                _ => {
-                    v.problem("wanted two curvatures, about d1 and d2", None);
-                    None
+            Some(v) if v.is_array() => {
+                match v.quantities(Dim::CURVATURE, "two curvatures, about d1 and d2")?.as_slice() {
+                    [a, b] => Some((*a, *b)),
+                    _ => {
+                        v.problem("wanted two curvatures, about d1 and d2", None);
+                        None
+                    }
                 }
-            },
+            }
             Some(v) => v.quantity(Dim::CURVATURE).map(|k| (k, 0.0)),
             None => Some((0.0, 0.0)),
         };
@@ -316,7 +367,10 @@ impl<'d> Loader<'d> {
         for item in value.array("an array of places such as { thread = \"a\", at = \"end\" }")? {
             let t = item.table()?;
             let thread = self.thread_of(&t);
-            let place = t.need("at", "start, end, middle, a length or \"particle 3\"").zip(thread).and_then(|(v, thread)| self.place(&v, thread));
+            let place = t
+                .need("at", "start, end, middle, a length or \"particle 3\"")
+                .zip(thread)
+                .and_then(|(v, thread)| self.place(&v, thread));
             t.finish();
             places.push((thread?, place?));
         }
@@ -338,7 +392,10 @@ impl<'d> Loader<'d> {
 
     pub(super) fn shape(&mut self, table: &Table<'d>) {
         let index = self.shapes.len();
-        let name = table.need("name", "the name of the shape").and_then(|v| v.text()).map_or(format!("shape{index}"), std::borrow::Cow::into_owned);
+        let name = table
+            .need("name", "the name of the shape")
+            .and_then(|v| v.text())
+            .map_or(format!("shape{index}"), std::borrow::Cow::into_owned);
         let geometry = self.geometry(table);
         let open = table.truth_or("open", false);
         if let (Some(value), Some(other)) = (table.get("open"), &geometry)
@@ -352,7 +409,8 @@ impl<'d> Loader<'d> {
         // A stand-in for what was reported keeps the numbers of the following shapes right.
         let geometry = geometry.unwrap_or(Geometry::Sphere { radius: 1.0 });
         // Any shape may be moved or pushed by an action; one that never is stays where it is.
-        let spec = ShapeSpec { geometry, pose: Pose::new(position, orientation), surface, motion: ShapeMotion::Driven, open };
+        let spec =
+            ShapeSpec { geometry, pose: Pose::new(position, orientation), surface, motion: ShapeMotion::Driven, open };
         self.shapes.push(ShapeDef { name, spec, location: table.location() });
     }
 
@@ -366,7 +424,11 @@ impl<'d> Loader<'d> {
             2 | 3 => {
                 let (radius, half_length) = (length("radius"), length("length").map(|l| 0.5 * l));
                 let (radius, half_length) = (radius?, half_length?);
-                Some(if kind == 2 { Geometry::Capsule { radius, half_length } } else { Geometry::Cylinder { radius, half_length } })
+                Some(if kind == 2 {
+                    Geometry::Capsule { radius, half_length }
+                } else {
+                    Geometry::Cylinder { radius, half_length }
+                })
             }
             4 => {
                 let sides = table.need("sides", "three lengths")?;
@@ -392,18 +454,24 @@ impl<'d> Loader<'d> {
                 let vertices: Option<Vec<DVec3>> = table
                     .need("vertices", "corners, or a `file`")
                     .and_then(|v| v.array("an array of corners")?.iter().map(|v| v.vector(Dim::LENGTH)).collect());
-                let triangles: Option<Vec<[u32; 3]>> = table.need("triangles", "three corner numbers each, from 0").and_then(|v| {
-                    v.array("an array of triangles")?
-                        .iter()
-                        .map(|v| {
-                            let corners: Vec<u32> = v.array("three corner numbers")?.iter().filter_map(|c| c.integer(0, 1 << 30)).map(|c| c as u32).collect();
-                            <[u32; 3]>::try_from(corners).ok().or_else(|| {
-                                v.problem("a triangle has three corners", None);
-                                None
+                let triangles: Option<Vec<[u32; 3]>> =
+                    table.need("triangles", "three corner numbers each, from 0").and_then(|v| {
+                        v.array("an array of triangles")?
+                            .iter()
+                            .map(|v| {
+                                let corners: Vec<u32> = v
+                                    .array("three corner numbers")?
+                                    .iter()
+                                    .filter_map(|c| c.integer(0, 1 << 30))
+                                    .map(|c| c as u32)
+                                    .collect();
+                                <[u32; 3]>::try_from(corners).ok().or_else(|| {
+                                    v.problem("a triangle has three corners", None);
+                                    None
+                                })
                             })
-                        })
-                        .collect()
-                });
+                            .collect()
+                    });
                 Some(Geometry::Mesh { vertices: vertices?, triangles: triangles? })
             }
         }
@@ -493,7 +561,8 @@ fn stretch(table: &Table<'_>) -> Option<Stretch> {
 
 fn plasticity(value: &Value<'_>) -> Option<Plasticity> {
     let t = value.table()?;
-    let yield_curvature = t.need("yield_curvature", "a curvature (1/m)").and_then(|v| positive_value(&v, Dim::CURVATURE));
+    let yield_curvature =
+        t.need("yield_curvature", "a curvature (1/m)").and_then(|v| positive_value(&v, Dim::CURVATURE));
     let yield_twist = positive(&t, "yield_twist", Dim::CURVATURE);
     let hardening = in_range(&t, "hardening", Dim::NUMBER, 0.0, 0.999_999).unwrap_or(0.0);
     t.finish();
@@ -516,14 +585,24 @@ pub(super) fn remake(table: &Table<'_>) -> Remake {
         plasticity,
         stretch: stretch(table),
     };
-    const KEYS: [&str; 8] = ["young_modulus", "poisson_ratio", "shear_modulus", "density", "bend_scale", "bend_damping", "plasticity", "stretch"];
+    const KEYS: [&str; 8] = [
+        "young_modulus",
+        "poisson_ratio",
+        "shear_modulus",
+        "density",
+        "bend_scale",
+        "bend_damping",
+        "plasticity",
+        "stretch",
+    ];
     if !KEYS.iter().any(|k| table.has(k)) {
         table.problem("what of the material changes?", Some(format!("any of: {}", KEYS.join(", "))));
     }
     change
 }
 
-/// Knot-pull strength: as given, or the limit for size and material. (A name that is no preset's is reported where the number is used.)
+/// Knot-pull strength: as given, or the limit for size and material. (A name that is no preset's is reported where the
+/// number is used.)
 fn strength(table: &Table<'_>) -> Option<Strength> {
     if let Some(value) = positive(table, "knot_pull_strength", Dim::FORCE) {
         return Some(Strength { value, of: "as given".into() });
@@ -550,7 +629,10 @@ fn frames(points: &[DVec3], hint: Option<DVec3>, twist: f64) -> Option<Vec<DQuat
     if !distinct {
         return None; // the engine names the two points
     }
-    let bend = points.windows(3).map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize())).find(|c| c.length() > 1e-6);
+    let bend = points
+        .windows(3)
+        .map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize()))
+        .find(|c| c.length() > 1e-6);
     let q = transported_frames(points, hint.or(bend).unwrap_or(DVec3::ZERO));
     let n = q.len() as f64;
     Some(q.iter().enumerate().map(|(i, q)| (*q * exp(DVec3::Z * (twist * (i as f64 + 0.5) / n))).normalize()).collect())

@@ -60,20 +60,22 @@ impl<'d> Loader<'d> {
         if let Some(name) = &name
             && let Some(v) = table.get("name")
         {
-            if name == "frame" || self.profiles.contains(name) || matches!(self.names.get(name), Some(Named::Probe(_))) {
+            if name == "frame" || self.profiles.contains(name) || matches!(self.names.get(name), Some(Named::Probe(_)))
+            {
                 v.problem(format!("the name `{name}` is taken"), None);
             }
             self.profiles.push(name.clone());
         }
         let thread = self.thread_of(table);
         let words: Vec<(&str, ProfileColumn)> = PROFILES.iter().map(|p| (p.0, *p)).collect();
-        let what = table.need("what", "what to read along the thread, such as [\"position\", \"tension\"]").and_then(|v| {
-            if v.is_text() {
-                v.choice(&words).map(|p| vec![p])
-            } else {
-                v.array("names of what to read along the thread")?.iter().map(|v| v.choice(&words)).collect()
-            }
-        });
+        let what =
+            table.need("what", "what to read along the thread, such as [\"position\", \"tension\"]").and_then(|v| {
+                if v.is_text() {
+                    v.choice(&words).map(|p| vec![p])
+                } else {
+                    v.array("names of what to read along the thread")?.iter().map(|v| v.choice(&words)).collect()
+                }
+            });
         let moment = self.moment(table);
         table.finish();
         Some(ProfileDef { name: name?, thread: thread?, what: what?, moment: moment.unwrap_or(Moment::End) })
@@ -126,12 +128,22 @@ impl<'d> Loader<'d> {
         {
             v.problem("conditions and texts have no greatest, least or mean", None);
         }
-        Some(CheckDef { name, that, wanted, words, unit, span, take: take.unwrap_or(if windowed { Take::Every } else { Take::Last }) })
+        Some(CheckDef {
+            name,
+            that,
+            wanted,
+            words,
+            unit,
+            span,
+            take: take.unwrap_or(if windowed { Take::Every } else { Take::Last }),
+        })
     }
 
     pub(super) fn span(&self, table: &Table<'d>) -> Span {
         if let Some(v) = table.get("when") {
-            return v.choice(&[("end", Span::Once(Moment::End)), ("always", Span::Window(0.0, f64::INFINITY))]).unwrap_or(Span::Once(Moment::End));
+            return v
+                .choice(&[("end", Span::Once(Moment::End)), ("always", Span::Window(0.0, f64::INFINITY))])
+                .unwrap_or(Span::Once(Moment::End));
         }
         if let Some(v) = table.get("during") {
             return self.find_phase(&v).map_or(Span::Once(Moment::End), Span::During);
@@ -160,7 +172,11 @@ impl<'d> Loader<'d> {
                     }
                     return Some((Wanted::True, "true".into(), None));
                 };
-                return if v.truth()? { Some((Wanted::True, "true".into(), None)) } else { Some((Wanted::Text("false".into()), "false".into(), None)) };
+                return if v.truth()? {
+                    Some((Wanted::True, "true".into(), None))
+                } else {
+                    Some((Wanted::Text("false".into()), "false".into(), None))
+                };
             }
             Kind::Text => {
                 let v = table.need("equals", "the text wanted")?;
@@ -177,12 +193,17 @@ impl<'d> Loader<'d> {
             // A vector is judged by its length.
             Kind::Number(d) | Kind::Vector(d) => *d,
             Kind::Columns(_) => {
-                table.problem("several numbers cannot be checked at once; pick one, for instance `wrench(left).fx`", None);
+                table.problem(
+                    "several numbers cannot be checked at once; pick one, for instance `wrench(left).fx`",
+                    None,
+                );
                 return None;
             }
         };
         let unit = unit_for(table, that.kind());
-        let shown = |key: &str| table.get(key).and_then(|v| if v.is_text() { v.text().map(|t| t.trim().to_owned()) } else { None });
+        let shown = |key: &str| {
+            table.get(key).and_then(|v| if v.is_text() { v.text().map(|t| t.trim().to_owned()) } else { None })
+        };
         let in_unit = |value: f64| {
             let (scale, name) = unit.as_ref().map_or((1.0, dim.si_unit()), |(n, u)| (u.size, n.clone()));
             format!("{} {name}", value / scale).trim().to_owned()
@@ -198,7 +219,8 @@ impl<'d> Loader<'d> {
         let result = match given.as_slice() {
             ["equals"] => {
                 let value = table.get("equals")?.quantity(dim)?;
-                let v = tolerance.or_else(|| table.need("tolerance", "the difference allowed, such as \"0.1 mm\" or \"1 %\""))?;
+                let v = tolerance
+                    .or_else(|| table.need("tolerance", "the difference allowed, such as \"0.1 mm\" or \"1 %\""))?;
                 let (allowed, words) = allowed(&v, value, dim)?;
                 (Wanted::Near(value, allowed), format!("{} ± {words}", show("equals", value)))
             }
@@ -225,7 +247,10 @@ impl<'d> Loader<'d> {
             }
             _ => {
                 let message = if given.is_empty() { "what is wanted is missing" } else { "these exclude each other" };
-                table.problem(message, Some("one of: equals with tolerance, at_least, at_most, between; or a condition in `that`".into()));
+                table.problem(
+                    message,
+                    Some("one of: equals with tolerance, at_least, at_most, between; or a condition in `that`".into()),
+                );
                 return None;
             }
         };
@@ -248,7 +273,11 @@ fn allowed(value: &Value<'_>, wanted: f64, dim: Dim) -> Option<(f64, String)> {
         }
     }
     let allowed = in_range_value(value, dim, 0.0, f64::MAX)?;
-    let words = if value.is_text() { value.text()?.trim().to_owned() } else { format!("{allowed} {}", dim.si_unit()).trim().to_owned() };
+    let words = if value.is_text() {
+        value.text()?.trim().to_owned()
+    } else {
+        format!("{allowed} {}", dim.si_unit()).trim().to_owned()
+    };
     Some((allowed, words))
 }
 

@@ -14,7 +14,10 @@ fn torus(q: u32, t: f64) -> ([f64; 3], [f64; 3]) {
     let change = -0.4 * q * (q * t).sin();
     let (sin, cos) = (2.0 * t).sin_cos();
     // Down on the outside makes it right-handed.
-    ([radius * cos, radius * sin, -0.4 * (q * t).sin()], [change * cos - 2.0 * radius * sin, change * sin + 2.0 * radius * cos, -0.4 * q * (q * t).cos()])
+    (
+        [radius * cos, radius * sin, -0.4 * (q * t).sin()],
+        [change * cos - 2.0 * radius * sin, change * sin + 2.0 * radius * cos, -0.4 * q * (q * t).cos()],
+    )
 }
 
 /// `n` points of the figure-eight knot.
@@ -26,10 +29,14 @@ pub fn figure_eight(n: usize) -> Vec<[f64; 3]> {
     (0..n).map(|i| point(TAU * i as f64 / n as f64)).collect()
 }
 
-/// A closed braid of one strand more than there are throws: throw i twists strands i and i + 1 by as many crossings, to the right for
-/// positive ones. That is the connected sum of the throws, each closed.
+/// A closed braid of one strand more than there are throws: throw i twists strands i and i + 1 by as many crossings, to
+/// the right for positive ones. That is the connected sum of the throws, each closed.
 pub fn stacked_throws(crossings: &[i32]) -> Vec<[f64; 3]> {
-    let letters: Vec<(usize, f64)> = crossings.iter().enumerate().flat_map(|(lane, c)| (0..c.abs()).map(move |_| (lane, f64::from(c.signum())))).collect();
+    let letters: Vec<(usize, f64)> = crossings
+        .iter()
+        .enumerate()
+        .flat_map(|(lane, c)| (0..c.abs()).map(move |_| (lane, f64::from(c.signum()))))
+        .collect();
     const PIECES: usize = 8;
     let mut points = Vec::new();
     let mut lane = 0;
@@ -54,8 +61,8 @@ pub fn stacked_throws(crossings: &[i32]) -> Vec<[f64; 3]> {
     }
 }
 
-/// Writhe of the smooth torus knot: Gauss' double integral by the trapezoidal rule on `n` points, which converges faster than any
-/// power for a closed smooth curve (the integrand vanishes on the diagonal).
+/// Writhe of the smooth torus knot: Gauss' double integral by the trapezoidal rule on `n` points, which converges
+/// faster than any power for a closed smooth curve (the integrand vanishes on the diagonal).
 pub fn torus_writhe(q: u32, n: usize) -> f64 {
     let samples: Vec<([f64; 3], [f64; 3])> = (0..n).map(|i| torus(q, TAU * i as f64 / n as f64)).collect();
     let mut sum = 0.0;
@@ -63,7 +70,8 @@ pub fn torus_writhe(q: u32, n: usize) -> f64 {
         for (b, tb) in &samples[..i] {
             let d: [f64; 3] = std::array::from_fn(|k| a[k] - b[k]);
             let cross = [ta[1] * tb[2] - ta[2] * tb[1], ta[2] * tb[0] - ta[0] * tb[2], ta[0] * tb[1] - ta[1] * tb[0]];
-            sum += d.iter().zip(cross).map(|(d, c)| d * c).sum::<f64>() / d.iter().map(|d| d * d).sum::<f64>().powf(1.5);
+            sum +=
+                d.iter().zip(cross).map(|(d, c)| d * c).sum::<f64>() / d.iter().map(|d| d * d).sum::<f64>().powf(1.5);
         }
     }
     // Both orders of each pair, over 4 pi.
@@ -74,7 +82,8 @@ pub fn torus_writhe(q: u32, n: usize) -> f64 {
 mod tests {
     use super::*;
 
-    /// Polygons of 50, 100, 200, 400 points have 3.321992, 3.333206, 3.336092, 3.336819: of second order toward 3.33706.
+    /// Polygons of 50, 100, 200, 400 points have 3.321992, 3.333206, 3.336092, 3.336819: of second order toward
+    /// 3.33706.
     #[test]
     fn writhe_of_the_trefoil() {
         assert!((torus_writhe(3, 400) - 3.33706).abs() < 1e-4, "{}", torus_writhe(3, 400));

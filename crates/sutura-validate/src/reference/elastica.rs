@@ -51,14 +51,16 @@ pub fn tip_load_shape(k: f64, n: usize) -> Vec<(f64, f64)> {
                 return (0.0, 0.0);
             }
             // a'' = -k cos a, with the moment at the clamp from the table of the tip.
-            let y = integrate(&[0.0, clamp_curvature, 0.0, 0.0], s, |_, y, dy| dy.copy_from_slice(&[y[1], -k * y[0].cos(), y[0].cos(), y[0].sin()]));
+            let y = integrate(&[0.0, clamp_curvature, 0.0, 0.0], s, |_, y, dy| {
+                dy.copy_from_slice(&[y[1], -k * y[0].cos(), y[0].cos(), y[0].sin()])
+            });
             (y[2], y[3])
         })
         .collect()
 }
 
-/// A column pinned at both ends whose ends have come together by `shortening` of its length: load over Euler's pi^2 EI / L^2, and
-/// deflection in the middle.
+/// A column pinned at both ends whose ends have come together by `shortening` of its length: load over Euler's pi^2 EI
+/// / L^2, and deflection in the middle.
 pub fn buckled(shortening: f64) -> [f64; 2] {
     let chord = |k: f64| 2.0 * or_nan(ellipe(k * k)) / or_nan(ellipk(k * k)) - 1.0;
     let k = root(1e-9, 0.999, |k| 1.0 - chord(k) - shortening);

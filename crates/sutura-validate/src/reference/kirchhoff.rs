@@ -1,4 +1,5 @@
-//! The static Kirchhoff rod in space by shooting: inextensible, unshearable, of uniform stiffness and rest curvature about its own directors.
+//! The static Kirchhoff rod in space by shooting: inextensible, unshearable, of uniform stiffness and rest curvature
+//! about its own directors.
 //!
 //! R = [d1 d2 d3], R' = R hat(u), r' = d3, u = u0 + K^-1 R^T m, n' = 0, m' = -r' x n.
 
@@ -192,6 +193,9 @@ mod tests {
         // With its stretch the square's tip is at (15.5577, 46.8916, 53.6080): 1e-4 of the length away.
         let square = arc(100.0, FRAC_PI_4, [ei, ei, 0.5e7 * SQUARE], 600.0);
         let tip = square.tip().position;
-        assert!(tip.iter().zip([15.5577, 46.8916, 53.6080]).all(|(g, w)| (g - w).abs() < 1e-4 * square.length), "{tip:?}");
+        assert!(
+            tip.iter().zip([15.5577, 46.8916, 53.6080]).all(|(g, w)| (g - w).abs() < 1e-4 * square.length),
+            "{tip:?}"
+        );
     }
 }

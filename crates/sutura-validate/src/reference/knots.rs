@@ -1,7 +1,8 @@
 //! Forces of knots and plectonemes in thin elastic rods, and centerlines of loose long knots.
 //!
-//! h is the radius of the rod, R the radius of curvature with which the loop of a knot leaves its braid, eps = sqrt(h / R). Forces are
-//! over EI / h^2, moments over EI / h. A knot of n turns has 2n + 1 crossings; n = 1 is the overhand knot.
+//! h is the radius of the rod, R the radius of curvature with which the loop of a knot leaves its braid, eps = sqrt(h /
+//! R). Forces are over EI / h^2, moments over EI / h. A knot of n turns has 2n + 1 crossings; n = 1 is the overhand
+//! knot.
 
 use super::numeric::root;
 use ellip::{ellipe, ellipk};
@@ -10,14 +11,15 @@ use std::f64::consts::{PI, TAU};
 /// Friction constant of the overhand knot.
 pub const SIGMA: f64 = 0.492;
 
-/// Force of an overhand knot in the limit of small eps, drawn by its ends or, with `sign` -1, let out (Audoly, Clauvelin and Neukirch 2007).
+/// Force of an overhand knot in the limit of small eps, drawn by its ends or, with `sign` -1, let out (Audoly,
+/// Clauvelin and Neukirch 2007).
 pub fn overhand(eps: f64, mu: f64, sign: f64) -> f64 {
     0.5 * eps.powi(4) + sign * SIGMA * mu * eps.powi(3)
 }
 
-/// n^2 times the force of a long knot for n^2 h / e, with e the length that the knot takes up, in the limit of many turns that
-/// friction holds (Jawed, Dieleman, Audoly and Reis 2015, equation 5): the loop is a planar elastica that leaves the braid with curvature 1 / R and comes
-/// back to its other end, x = l / R is the length of the braid.
+/// n^2 times the force of a long knot for n^2 h / e, with e the length that the knot takes up, in the limit of many
+/// turns that friction holds (Jawed, Dieleman, Audoly and Reis 2015, equation 5): the loop is a planar elastica that
+/// leaves the braid with curvature 1 / R and comes back to its other end, x = l / R is the length of the braid.
 pub fn long_knot(shortening: f64, mu: f64) -> f64 {
     let shape = |m: f64| {
         let (k, e) = (ellipk(m).unwrap_or(f64::NAN), ellipe(m).unwrap_or(f64::NAN));
@@ -33,8 +35,8 @@ pub fn long_knot(shortening: f64, mu: f64) -> f64 {
     mu * loop_of(q).0.powi(3) / (96.0 * c)
 }
 
-/// Force along the axis that a ply of angle `angle` and radius h balances, without friction (Clauvelin, Audoly and Neukirch 2009,
-/// equation 9).
+/// Force along the axis that a ply of angle `angle` and radius h balances, without friction (Clauvelin, Audoly and
+/// Neukirch 2009, equation 9).
 pub fn ply_force(angle: f64) -> f64 {
     let (sin, cos) = angle.sin_cos();
     sin.powi(3) * (cos * (2.0 * angle).tan() - 0.5 * sin)
@@ -46,9 +48,9 @@ pub fn ply_moment(angle: f64) -> f64 {
     2.0 * cos * sin.powi(3) / (2.0 * angle).cos()
 }
 
-/// Centerline of a loose knot of `turns` turns, right-handed, of a rod of unit radius: two strands 3 radii apart wind around each other
-/// along x with the pitch that theory gives them at `eps`, a flat loop of two half circles and a straight piece joins them, and the tails
-/// go on along x for `tail`. Points are `spacing` apart; corners are rounded.
+/// Centerline of a loose knot of `turns` turns, right-handed, of a rod of unit radius: two strands 3 radii apart wind
+/// around each other along x with the pitch that theory gives them at `eps`, a flat loop of two half circles and a
+/// straight piece joins them, and the tails go on along x for `tail`. Points are `spacing` apart; corners are rounded.
 pub fn loose(turns: u32, eps: f64, tail: f64, spacing: f64) -> Vec<[f64; 3]> {
     let radius = eps.powi(-2);
     let half = 0.5 * f64::from(turns) * TAU * (12.0_f64.sqrt() * radius).sqrt();
@@ -82,8 +84,9 @@ pub fn loose(turns: u32, eps: f64, tail: f64, spacing: f64) -> Vec<[f64; 3]> {
     resampled(&curve, spacing)
 }
 
-/// Centerline of one thread of a loose bend of two, in millimeters, of thread of 0.2 mm; the other is the same turned half around y. Two half knots
-/// follow one another along y: a reef when `side` is 1 (they are of opposite hands), a granny when it is -1. The standing end is at the start.
+/// Centerline of one thread of a loose bend of two, in millimeters, of thread of 0.2 mm; the other is the same turned
+/// half around y. Two half knots follow one another along y: a reef when `side` is 1 (they are of opposite hands), a
+/// granny when it is -1. The standing end is at the start.
 pub fn bend(side: f64) -> Vec<[f64; 3]> {
     // Half length of a throw, radius of its strands, and of the turn from one throw into the other.
     let (half, wound, turn) = (2.4, 0.22, 1.28);
@@ -162,14 +165,21 @@ mod tests {
 
     #[test]
     fn forces_of_long_knots_are_those_of_the_table() {
-        for (shortening, force) in [(9.20878e-5, 1.64525e-5), (8.14935e-4, 6.09352e-4), (2.57856e-3, 4.87482e-3), (7.44516e-3, 3.89985e-2)] {
+        for (shortening, force) in
+            [(9.20878e-5, 1.64525e-5), (8.14935e-4, 6.09352e-4), (2.57856e-3, 4.87482e-3), (7.44516e-3, 3.89985e-2)]
+        {
             close(long_knot(shortening, 1.0), force, 1e-4);
         }
     }
 
     #[test]
     fn plies_are_those_of_the_table() {
-        for (degrees, force, moment) in [(15.0_f64, 0.007425, 0.038675), (20.0, 0.024705, 0.098156), (25.0, 0.065578, 0.212855), (30.0, 0.156250, 0.433013)] {
+        for (degrees, force, moment) in [
+            (15.0_f64, 0.007425, 0.038675),
+            (20.0, 0.024705, 0.098156),
+            (25.0, 0.065578, 0.212855),
+            (30.0, 0.156250, 0.433013),
+        ] {
             close(ply_force(degrees.to_radians()), force, 1e-4);
             close(ply_moment(degrees.to_radians()), moment, 1e-4);
         }

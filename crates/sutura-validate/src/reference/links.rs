@@ -1,5 +1,6 @@
-//! Chains of n rigid links of length 1/n: what an inextensible rod of n elements is once it is discretized. Joints between links have
-//! the stiffness n EI / L, a clamped end 2 n EI / L (half an element); mass is at the particles, half as much at free ends.
+//! Chains of n rigid links of length 1/n: what an inextensible rod of n elements is once it is discretized. Joints
+//! between links have the stiffness n EI / L, a clamped end 2 n EI / L (half an element); mass is at the particles,
+//! half as much at free ends.
 
 use super::numeric::{integrate, newton};
 use nalgebra::{DMatrix, DVector};
@@ -66,8 +67,8 @@ pub enum End {
     Clamped,
 }
 
-/// Bending of the links for small deflections of particles 1, 2, .. (the start is clamped or pinned on the axis): joint angles by
-/// deflection, and stiffness of each joint.
+/// Bending of the links for small deflections of particles 1, 2, .. (the start is clamped or pinned on the axis): joint
+/// angles by deflection, and stiffness of each joint.
 fn joints(n: usize, start: End, end: End) -> (DMatrix<f64>, DVector<f64>) {
     let free = if end == End::Free { n } else { n - 1 };
     let per = n as f64;
@@ -147,7 +148,8 @@ fn modes(stiffness: &DMatrix<f64>, mass: &[f64]) -> Vec<(f64, DVector<f64>)> {
     let root = DVector::from_iterator(mass.len(), mass.iter().map(|m| 1.0 / m.sqrt()));
     let scaled = DMatrix::from_diagonal(&root) * stiffness * DMatrix::from_diagonal(&root);
     let eigen = scaled.symmetric_eigen();
-    let mut all: Vec<(f64, DVector<f64>)> = (0..mass.len()).map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).component_mul(&root))).collect();
+    let mut all: Vec<(f64, DVector<f64>)> =
+        (0..mass.len()).map(|i| (eigen.eigenvalues[i], eigen.eigenvectors.column(i).component_mul(&root))).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(w2, shape)| (w2.max(0.0).sqrt(), shape)).collect()
 }
@@ -158,13 +160,14 @@ pub fn chain_modes(n: usize) -> Vec<(f64, DVector<f64>)> {
     modes(&compression(n, End::Free, &beyond(&mass)), &mass)
 }
 
-/// Vibrations of a cantilever: angular frequencies in sqrt(EI / (mass L^3)) with the mass of the whole rod, deflections of particles 1 to n.
+/// Vibrations of a cantilever: angular frequencies in sqrt(EI / (mass L^3)) with the mass of the whole rod, deflections
+/// of particles 1 to n.
 pub fn cantilever_modes(n: usize) -> Vec<(f64, DVector<f64>)> {
     modes(&bending(n, End::Clamped, End::Free), &masses(n))
 }
 
-/// A chain of n links between two ends `span` apart, the far end `rise` higher: horizontal force, forces in the first and last link
-/// over the weight, and the height of each particle.
+/// A chain of n links between two ends `span` apart, the far end `rise` higher: horizontal force, forces in the first
+/// and last link over the weight, and the height of each particle.
 pub fn catenary(n: usize, span: f64, rise: f64) -> (f64, [f64; 2], Vec<f64>) {
     let count = n as f64;
     // Vertical over horizontal force in link i; interior particles carry a link's weight each.
@@ -182,15 +185,15 @@ pub fn catenary(n: usize, span: f64, rise: f64) -> (f64, [f64; 2], Vec<f64>) {
     (x[0], [tension(0), tension(n - 1)], heights)
 }
 
-/// Tip of a chain of n links of total length `length` \[m\] let go level at rest, after `time` \[s\]: across and up \[m\]. The exact
-/// equations of motion in the angles.
+/// Tip of a chain of n links of total length `length` \[m\] let go level at rest, after `time` \[s\]: across and up
+/// \[m\]. The exact equations of motion in the angles.
 pub fn chain_swing(n: usize, length: f64, time: f64) -> [f64; 2] {
     rod_swing(n, length, 0.0, 0.0, &[time])[0]
 }
 
-/// The same at several times, in ascending order, with elastic joints and a clamped start (`bending` is EI over the mass of the whole
-/// \[m^3 / s^2\]; a pin where it is zero) and a drag, a force per velocity and mass \[1/s\]. Each piece between times has the integrator's
-/// 2000 steps: they have to resolve the highest mode.
+/// The same at several times, in ascending order, with elastic joints and a clamped start (`bending` is EI over the
+/// mass of the whole \[m^3 / s^2\]; a pin where it is zero) and a drag, a force per velocity and mass \[1/s\]. Each
+/// piece between times has the integrator's 2000 steps: they have to resolve the highest mode.
 pub fn rod_swing(n: usize, length: f64, bending: f64, drag: f64, times: &[f64]) -> Vec<[f64; 2]> {
     let l = length / n as f64;
     let carried = beyond(&masses(n));
@@ -251,7 +254,12 @@ mod tests {
         let [free, _, one, both] = elastica::critical_loads();
         for (end, want) in [(End::Free, free), (End::Pinned, one), (End::Clamped, both)] {
             let error = |n| critical_load(n, End::Clamped, end) / want - 1.0;
-            assert!(error(40).abs() < 4e-3 && (error(40) / error(80) - 4.0).abs() < 0.1, "{end:?}: {} {}", error(40), error(80));
+            assert!(
+                error(40).abs() < 4e-3 && (error(40) / error(80) - 4.0).abs() < 0.1,
+                "{end:?}: {} {}",
+                error(40),
+                error(80)
+            );
         }
         let error = |n| heavy_column(n) / elastica::heavy_column() - 1.0;
         assert!(error(40).abs() < 2e-3 && (error(40) / error(80) - 4.0).abs() < 0.1);
@@ -266,7 +274,12 @@ mod tests {
         }
         for (n, sag, h) in [(10, 0.402_185, 0.114_739), (20, 0.399_137, f64::NAN), (40, 0.398_427, f64::NAN)] {
             let (force, [a, b], heights) = catenary(n, 0.5, 0.0);
-            assert!((-heights[n / 2] - sag).abs() < 6e-7 && (h.is_nan() || (force - h).abs() < 6e-7) && (a - b).abs() < 1e-12, "{n}");
+            assert!(
+                (-heights[n / 2] - sag).abs() < 6e-7
+                    && (h.is_nan() || (force - h).abs() < 6e-7)
+                    && (a - b).abs() < 1e-12,
+                "{n}"
+            );
         }
         // The continuous one with d = 0.5, h = 0.2.
         let (force, [a, b], heights) = catenary(400, 0.5, 0.2);
@@ -289,7 +302,10 @@ mod tests {
         let (n, length, g) = (5, 0.1, 5.0);
         let got = rod_swing(n, length, super::super::material::GRAVITY * length.powi(2) / g, 30.0, &[0.5, 1.0, 1.5])[2];
         let want = cantilever(n, 0.0, g);
-        assert!((got[0] / length - want[0]).abs() < 1e-6 && (got[1] / length + want[1]).abs() < 1e-6, "{got:?} {want:?}");
+        assert!(
+            (got[0] / length - want[0]).abs() < 1e-6 && (got[1] / length + want[1]).abs() < 1e-6,
+            "{got:?} {want:?}"
+        );
     }
 
     #[test]

@@ -67,7 +67,9 @@ mod tests {
             (T2, 1.57080e-8, 1.12200e-8, 6.28319, 4.08407e-5, 4.00647e-4),
             (G1, 1.84791e-3, 1.38941e-3, 37326.8, 4.01263e-3, 3.93639e-2),
         ] {
-            for (got, want) in [(rod.ei(), ei), (rod.gj(), gj), (rod.ea(), ea), (rod.mass(), mass), (rod.weight(), weight)] {
+            for (got, want) in
+                [(rod.ei(), ei), (rod.gj(), gj), (rod.ea(), ea), (rod.mass(), mass), (rod.weight(), weight)]
+            {
                 assert!((got / want - 1.0).abs() < 3e-6, "{got} {want}");
             }
         }

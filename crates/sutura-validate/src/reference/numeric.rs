@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// The root of `f` between `a` and `b`, where it has opposite signs; not a number where it has not. Bisection down to rounding: Brent's
-/// method in the crate `roots` 0.0.8 does not end where `f` holds the rounding of an integration.
+/// The root of `f` between `a` and `b`, where it has opposite signs; not a number where it has not. Bisection down to
+/// rounding: Brent's method in the crate `roots` 0.0.8 does not end where `f` holds the rounding of an integration.
 pub fn root(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (a, b);
     let rising = f(low) < 0.0;
@@ -61,8 +61,9 @@ pub fn newton(start: &[f64], f: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
     x
 }
 
-/// y at `end` of y' = f(x, y), y(0) = `start`: the classical Runge-Kutta rule of order 4 in 2000 steps, an error of some 1e-11 for what is
-/// asked here. (Dormand and Prince in the crate `ode_solvers` 0.6 gives up on slopes that begin at zero.)
+/// y at `end` of y' = f(x, y), y(0) = `start`: the classical Runge-Kutta rule of order 4 in 2000 steps, an error of
+/// some 1e-11 for what is asked here. (Dormand and Prince in the crate `ode_solvers` 0.6 gives up on slopes that begin
+/// at zero.)
 pub fn integrate(start: &[f64], end: f64, f: impl Fn(f64, &[f64], &mut [f64])) -> Vec<f64> {
     const STEPS: u32 = 2000;
     let h = end / f64::from(STEPS);

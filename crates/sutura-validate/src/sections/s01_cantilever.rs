@@ -46,7 +46,8 @@ pub fn section() -> Section {
 
 /// The cantilever with a tip load.
 fn loaded(k: f64) -> Study {
-    Study::new(format!("tip load k = {k}"), "cantilever").set("phase.load.action[0].force", vector([0.0, 0.0, -k * T1.ei() / (LENGTH * LENGTH)]))
+    Study::new(format!("tip load k = {k}"), "cantilever")
+        .set("phase.load.action[0].force", vector([0.0, 0.0, -k * T1.ei() / (LENGTH * LENGTH)]))
 }
 
 fn tip_load(k: f64) -> Study {
@@ -60,7 +61,9 @@ fn tip_load(k: f64) -> Study {
         .quantity(Quantity::last("slope at the tip [rad]", "slope", 1.0, slope, source, Bar::Order(0.01, 1.8)))
         .quantity(discrete("drop / L", LENGTH, k, 0.0));
     if DRAWN.contains(&k) {
-        study.curve(|outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect())
+        study.curve(|outcome| {
+            columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect()
+        })
     } else {
         study
     }
@@ -99,7 +102,10 @@ fn tip_moment(turns: f64) -> Study {
     let moment = angle * T1.ei() / LENGTH;
     let exact = [angle.sin() / angle, (1.0 - angle.cos()) / angle];
     Study::new(format!("tip moment, {turns} turns"), "cantilever")
-        .set("phase.load.action[0]", format!("{{ load = \"tip\", at = \"end\", torque = {}, ramp = \"4 s\" }}", vector([0.0, moment, 0.0])))
+        .set(
+            "phase.load.action[0]",
+            format!("{{ load = \"tip\", at = \"end\", torque = {}, ramp = \"4 s\" }}", vector([0.0, moment, 0.0])),
+        )
         .elements("rod", &ELEMENTS)
         .quantity(Quantity::last("reach / L", "tip.x", 1.0 / LENGTH, exact[0], "arc", Bar::Order(0.01, 1.8)).scale(1.0))
         .quantity(Quantity::last("drop / L", "tip.z", -1.0 / LENGTH, exact[1], "arc", Bar::Order(0.01, 1.8)).scale(1.0))
@@ -116,5 +122,11 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
             curves.push(Curve { name: format!("k = {k}, ours"), points, dots: true });
         }
     }
-    vec![Plot { file: "elastica", title: "Cantilever under a tip load k = P L² / EI".into(), x: ("x / L", ""), y: ("z / L", ""), curves }]
+    vec![Plot {
+        file: "elastica",
+        title: "Cantilever under a tip load k = P L² / EI".into(),
+        x: ("x / L", ""),
+        y: ("z / L", ""),
+        curves,
+    }]
 }

@@ -31,7 +31,13 @@ pub fn section() -> Section {
         section.studies.push(heavy(weight, Ends::Clamped));
     }
     let force = |o: &Outcome| 1e3 * last(o, "right_force.x");
-    section.studies.push(independence("chain, span 0.5, other settings", 0.1, hanging(0.5, 0.0).levels(Vec::new()), "horizontal force [mN]", force));
+    section.studies.push(independence(
+        "chain, span 0.5, other settings",
+        0.1,
+        hanging(0.5, 0.0).levels(Vec::new()),
+        "horizontal force [mN]",
+        force,
+    ));
     for mode in 0..3 {
         section.studies.push(swinging(mode));
     }
@@ -48,7 +54,9 @@ fn hanging(span: f64, rise: f64) -> Study {
     let depth = (0.25 - 0.25 * chord * chord).sqrt() / chord;
     let low = [(0.5 * span + depth * rise) * LENGTH, 0.0, (0.5 * rise - depth * span) * LENGTH];
     let weight = T2.weight() * LENGTH;
-    let of = |f: &dyn Fn((f64, [f64; 2], Vec<f64>)) -> f64| COUNTS.iter().map(|n| f(links::catenary(*n as usize, span, rise))).collect::<Vec<_>>();
+    let of = |f: &dyn Fn((f64, [f64; 2], Vec<f64>)) -> f64| {
+        COUNTS.iter().map(|n| f(links::catenary(*n as usize, span, rise))).collect::<Vec<_>>()
+    };
     let lowest = |outcome: &Outcome| {
         // Elements report their middles; the lowest particle is the start of the last one that goes down, by its slope.
         let z = columns(outcome, "along", ["z"]);
@@ -61,19 +69,47 @@ fn hanging(span: f64, rise: f64) -> Study {
         }
         -least / LENGTH
     };
-    let mut study = Study::new(if rise == 0.0 { format!("chain, span {span}") } else { format!("chain, span {span}, rise {rise}") }, "chain_hanging")
-        .levels(COUNTS.map(|n| Level::new(n.to_string(), 1.0 / f64::from(n), &[("thread.chain.points", legs(n, low, end))])).into())
-        .quick(span == 0.5 && rise == 0.0)
-        .quantity(Quantity::measured("sag", lowest, of(&|c| -c.2.iter().copied().fold(0.0, f64::min)), CHAIN, Bar::Within(0.001)))
-        .quantity(Quantity::last("horizontal force", "right_force.x", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005)).references(of(&|c| c.0)))
-        .quantity(Quantity::last("tension, first link", "first", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005)).references(of(&|c| c.1[0])))
-        .quantity(Quantity::last("tension, last link", "last", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005)).references(of(&|c| c.1[1])))
-        .quantity(Quantity::measured("greatest elongation", |o| last(o, "elongation"), Vec::new(), "inextensible", Bar::AtMost(1e-4)));
+    let mut study = Study::new(
+        if rise == 0.0 { format!("chain, span {span}") } else { format!("chain, span {span}, rise {rise}") },
+        "chain_hanging",
+    )
+    .levels(
+        COUNTS
+            .map(|n| Level::new(n.to_string(), 1.0 / f64::from(n), &[("thread.chain.points", legs(n, low, end))]))
+            .into(),
+    )
+    .quick(span == 0.5 && rise == 0.0)
+    .quantity(Quantity::measured(
+        "sag",
+        lowest,
+        of(&|c| -c.2.iter().copied().fold(0.0, f64::min)),
+        CHAIN,
+        Bar::Within(0.001),
+    ))
+    .quantity(
+        Quantity::last("horizontal force", "right_force.x", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005))
+            .references(of(&|c| c.0)),
+    )
+    .quantity(
+        Quantity::last("tension, first link", "first", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005))
+            .references(of(&|c| c.1[0])),
+    )
+    .quantity(
+        Quantity::last("tension, last link", "last", 1.0 / weight, 0.0, CHAIN, Bar::Within(0.005))
+            .references(of(&|c| c.1[1])),
+    )
+    .quantity(Quantity::measured(
+        "greatest elongation",
+        |o| last(o, "elongation"),
+        Vec::new(),
+        "inextensible",
+        Bar::AtMost(1e-4),
+    ));
     if rise == 0.0 {
         let [sag, ..] = catenary::level(span);
-        study = study
-            .quantity(Quantity::measured("sag", lowest, vec![sag], "catenary", Bar::Order(0.01, 1.8)))
-            .curve(|outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect());
+        study = study.quantity(Quantity::measured("sag", lowest, vec![sag], "catenary", Bar::Order(0.01, 1.8))).curve(
+            |outcome| columns(outcome, "along", ["x", "z"]).iter().map(|[x, z]| (x / LENGTH, z / LENGTH)).collect(),
+        );
     }
     study
 }
@@ -98,7 +134,14 @@ fn heavy(weight: f64, ends: Ends) -> Study {
         .set("grip.right.hold", hold)
         .set("phase.together.action[0].keys[0].to", vector([0.5 * length, 0.0, 0.0]))
         .elements("rod", &[100, 200, 400])
-        .quantity(Quantity::last("sag", "sag", 1.0 / length, reference, "differences, extrapolated", Bar::Order(0.01, 1.8)))
+        .quantity(Quantity::last(
+            "sag",
+            "sag",
+            1.0 / length,
+            reference,
+            "differences, extrapolated",
+            Bar::Order(0.01, 1.8),
+        ))
 }
 
 fn swinging(mode: usize) -> Study {
@@ -117,13 +160,16 @@ fn swinging(mode: usize) -> Study {
         Level::new(n.to_string(), 1.0 / n as f64, &[("thread.chain.points", format!("[{}]", text.join(", ")))])
     });
     let hz = |n: usize| euler_frequency(links::chain_modes(n)[mode].0 * (GRAVITY / LENGTH).sqrt(), 1e-3) / TAU;
-    Study::new(format!("hanging chain, mode {}", mode + 1), "chain_swinging").levels(levels.into()).quick(mode == 0).quantity(Quantity::measured(
-        "frequency [Hz]",
-        |outcome| frequency(&series(outcome, "tip")),
-        [10, 20, 40].map(hz).to_vec(),
-        CHAIN,
-        Bar::Within(0.005),
-    ))
+    Study::new(format!("hanging chain, mode {}", mode + 1), "chain_swinging")
+        .levels(levels.into())
+        .quick(mode == 0)
+        .quantity(Quantity::measured(
+            "frequency [Hz]",
+            |outcome| frequency(&series(outcome, "tip")),
+            [10, 20, 40].map(hz).to_vec(),
+            CHAIN,
+            Bar::Within(0.005),
+        ))
 }
 
 fn dropped() -> Study {
@@ -135,9 +181,17 @@ fn dropped() -> Study {
             tip.map_or(f64::NAN, |[_, x, z]| 1e3 * (x - exact[0]).hypot(z - exact[1]))
         };
         let name = format!("tip at {time} s, distance from ({:.4}, {:.4}) mm [mm]", 1e3 * exact[0], 1e3 * exact[1]);
-        study = study.quantity(Quantity::measured(name, off, vec![0.0], "equations of motion", Bar::Order(0.01, 0.8)).scale(100.0));
+        study = study.quantity(
+            Quantity::measured(name, off, vec![0.0], "equations of motion", Bar::Order(0.01, 0.8)).scale(100.0),
+        );
     }
-    study.quantity(Quantity::measured("greatest elongation", |o| o.report.work.max_length_error, Vec::new(), "inextensible", Bar::AtMost(1e-4)))
+    study.quantity(Quantity::measured(
+        "greatest elongation",
+        |o| o.report.work.max_length_error,
+        Vec::new(),
+        "inextensible",
+        Bar::AtMost(1e-4),
+    ))
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
@@ -151,5 +205,11 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
             curves.push(Curve { name: format!("span {span}, ours"), points: s.curve.clone(), dots: true });
         }
     }
-    vec![Plot { file: "catenary", title: "Chains of 80 links between two pins".into(), x: ("x / L", ""), y: ("z / L", ""), curves }]
+    vec![Plot {
+        file: "catenary",
+        title: "Chains of 80 links between two pins".into(),
+        x: ("x / L", ""),
+        y: ("z / L", ""),
+        curves,
+    }]
 }

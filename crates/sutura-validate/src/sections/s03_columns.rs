@@ -24,20 +24,28 @@ pub fn section() -> Section {
          them by about a thousandth of their length they stand, or fall. Columns shortened by a part e of their length, against the elastica: \
          load over Euler's, bow over length.",
     );
-    for (name, start, end) in [("pinned", End::Pinned, End::Pinned), ("clamped and pinned", End::Clamped, End::Pinned), ("clamped", End::Clamped, End::Clamped)]
-    {
+    for (name, start, end) in [
+        ("pinned", End::Pinned, End::Pinned),
+        ("clamped and pinned", End::Clamped, End::Pinned),
+        ("clamped", End::Clamped, End::Clamped),
+    ] {
         for part in PARTS {
             let load = |n| part * links::critical_load(n, start, end) * T1.ei() / (LENGTH * LENGTH);
             let levels = COUNTS.map(|n| level(n, &[("grip.head.force", format!("{:e}", load(n)))]));
-            let study =
-                Study::new(format!("{name}, {part} of the critical load"), "column").set("grip.foot.hold", hold(start)).set("grip.head.hold", hold(end));
+            let study = Study::new(format!("{name}, {part} of the critical load"), "column")
+                .set("grip.foot.hold", hold(start))
+                .set("grip.head.hold", hold(end));
             section.studies.push(stands(study.levels(levels.into()), part, LENGTH).quick(start == End::Pinned));
         }
     }
     for part in PARTS {
         let load = |n| part * links::critical_load(n, End::Clamped, End::Free) * T1.ei() / (LENGTH * LENGTH);
         let levels = COUNTS.map(|n| level(n, &[("phase.nudge.action[0].force", vector([0.0, 0.0, -load(n)]))]));
-        section.studies.push(stands(Study::new(format!("clamped and free, {part} of the critical load"), "column_free").levels(levels.into()), part, LENGTH));
+        section.studies.push(stands(
+            Study::new(format!("clamped and free, {part} of the critical load"), "column_free").levels(levels.into()),
+            part,
+            LENGTH,
+        ));
     }
     for part in PARTS {
         let length = |n| (part * links::heavy_column(n) * T1.ei() / T1.weight()).cbrt();
@@ -54,9 +62,18 @@ pub fn section() -> Section {
         section.studies.push(buckled(e, End::Clamped));
     }
     let load = |o: &Outcome| 1e3 * last(o, "load");
-    section.studies.push(independence("pinned, shortened by 0.2, other settings", 5e-3, buckled(0.2, End::Pinned), "load [mN]", load));
+    section.studies.push(independence(
+        "pinned, shortened by 0.2, other settings",
+        5e-3,
+        buckled(0.2, End::Pinned),
+        "load [mN]",
+        load,
+    ));
     section.plots = plots;
-    section.left_out = &[LeftOut { what: "guidewire in a straight vessel", why: "there is no hollow shape but a mesh, not set up yet" }];
+    section.left_out = &[LeftOut {
+        what: "guidewire in a straight vessel",
+        why: "there is no hollow shape but a mesh, not set up yet",
+    }];
     section
 }
 
@@ -72,7 +89,13 @@ fn level(n: usize, settings: &[(&str, String)]) -> Level {
 
 fn stands(study: Study, part: f64, length: f64) -> Study {
     let bar = if part < 1.0 { Bar::AtMost(1e-3) } else { Bar::AtLeast(0.05) };
-    study.quantity(Quantity::measured("bow / L at the end", move |o| last(o, "bow") / length, Vec::new(), "stands below, falls above", bar))
+    study.quantity(Quantity::measured(
+        "bow / L at the end",
+        move |o| last(o, "bow") / length,
+        Vec::new(),
+        "stands below, falls above",
+        bar,
+    ))
 }
 
 fn buckled(e: f64, ends: End) -> Study {
@@ -84,7 +107,14 @@ fn buckled(e: f64, ends: End) -> Study {
         .set("phase.together.action[0].keys[0].by", vector([-e * LENGTH, 0.0, 0.0]))
         .elements("rod", &ELEMENTS)
         .quick(e == 0.2)
-        .quantity(Quantity::last("load over Euler's", "load", LENGTH * LENGTH / (T1.ei() * euler), load, "elliptic integrals", Bar::Order(0.01, 1.8)))
+        .quantity(Quantity::last(
+            "load over Euler's",
+            "load",
+            LENGTH * LENGTH / (T1.ei() * euler),
+            load,
+            "elliptic integrals",
+            Bar::Order(0.01, 1.8),
+        ))
         .quantity(Quantity::last("bow / L", "bow", 1.0 / LENGTH, bow, "elliptic integrals", Bar::Order(0.01, 1.8)))
 }
 
@@ -103,5 +133,11 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
         Curve { name: "pinned, ours".into(), points: ours("pinned", &PINNED), dots: true },
         Curve { name: "clamped, ours".into(), points: ours("clamped", &CLAMPED), dots: true },
     ];
-    vec![Plot { file: "buckling", title: "Load of a buckled column over Euler's".into(), x: ("shortening / L", ""), y: ("P / P Euler", ""), curves }]
+    vec![Plot {
+        file: "buckling",
+        title: "Load of a buckled column over Euler's".into(),
+        x: ("shortening / L", ""),
+        y: ("P / P Euler", ""),
+        curves,
+    }]
 }

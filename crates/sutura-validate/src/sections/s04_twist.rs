@@ -44,13 +44,30 @@ fn twisted(name: String, t: f64, part: f64) -> (Study, f64) {
 
 fn greenhill(t: f64, part: f64) -> Study {
     let (study, moment) = twisted(format!("rod, t = {t}, {part} of the limit"), t, part);
-    let study = study.levels([100, 200].map(|n: u32| Level::new(n.to_string(), 0.0, &[("thread.rod.elements", n.to_string())])).into()).quick(t == 10.0);
+    let study = study
+        .levels(
+            [100, 200].map(|n: u32| Level::new(n.to_string(), 0.0, &[("thread.rod.elements", n.to_string())])).into(),
+        )
+        .quick(t == 10.0);
     let bar = if part < 1.0 { Bar::AtMost(1e-3) } else { Bar::AtLeast(0.01) };
     // What falls goes fast: shorter substeps, so that it is seen before it touches itself.
     let study = if part < 1.0 { study } else { study.set("solver.substep", "0.5 ms").set("frame_rate", 2000) };
-    let study = study.quantity(Quantity::measured("off the axis / L", |o| last(o, "off_axis") / LENGTH, Vec::new(), "stays below, leaves above", bar));
+    let study = study.quantity(Quantity::measured(
+        "off the axis / L",
+        |o| last(o, "off_axis") / LENGTH,
+        Vec::new(),
+        "stays below, leaves above",
+        bar,
+    ));
     if part < 1.0 {
-        study.quantity(Quantity::last("torque over its limit", "torque", part / moment, part, "GJ times twist", Bar::Within(0.001)))
+        study.quantity(Quantity::last(
+            "torque over its limit",
+            "torque",
+            part / moment,
+            part,
+            "GJ times twist",
+            Bar::Within(0.001),
+        ))
     } else {
         study
     }
@@ -70,7 +87,14 @@ fn hold() -> Study {
         .set("solver.substep", "10 ms")
         .set("thread.rod.elements", 50)
         .quantity(Quantity::measured("change of the torque", range, Vec::new(), "none", Bar::AtMost(1e-6)))
-        .quantity(Quantity::last("torque over its limit", "torque", 0.95 / moment, 0.95, "GJ times twist", Bar::Within(0.001)))
+        .quantity(Quantity::last(
+            "torque over its limit",
+            "torque",
+            0.95 / moment,
+            0.95,
+            "GJ times twist",
+            Bar::Within(0.001),
+        ))
 }
 
 fn michell(part: f64) -> Study {
@@ -78,14 +102,19 @@ fn michell(part: f64) -> Study {
     let counts: &[usize] = if (part - 1.0).abs() < 0.02 { &[50, 100] } else { &[100] };
     let put_in = |n: usize| part * twist::michell(n, T1.gj() / T1.ei()) * T1.ei() / T1.gj();
     let level = |n: &usize| {
-        let mut level = Level::new(n.to_string(), 0.0, &[("thread.ring.elements", n.to_string()), ("thread.ring.twist", format!("{:e}", put_in(*n)))]);
+        let mut level = Level::new(
+            n.to_string(),
+            0.0,
+            &[("thread.ring.elements", n.to_string()), ("thread.ring.twist", format!("{:e}", put_in(*n)))],
+        );
         for (load, quarter) in ["a", "b", "c", "d"].into_iter().zip(0..) {
             level.settings.push((format!("load.{load}.at"), format!("\"particle {}\"", quarter * n / 4)));
         }
         level
     };
     let writhe = |o: &Outcome| last(o, "writhe").abs();
-    let (words, bar) = if part < 1.0 { ("stays plane", Bar::AtMost(1e-3)) } else { ("leaves its plane", Bar::AtLeast(1.0)) };
+    let (words, bar) =
+        if part < 1.0 { ("stays plane", Bar::AtMost(1e-3)) } else { ("leaves its plane", Bar::AtLeast(1.0)) };
     let lost = |o: &Outcome| {
         let link = series(o, "link");
         link.iter().map(|p| (p.1 - link[0].1).abs()).fold(0.0, f64::max)
@@ -101,7 +130,13 @@ fn michell(part: f64) -> Study {
             "twist put in",
             Bar::Within(1e-6),
         ))
-        .quantity(Quantity::measured("largest change of twist + writhe [turns]", lost, Vec::new(), "kept", Bar::AtMost(0.01)))
+        .quantity(Quantity::measured(
+            "largest change of twist + writhe [turns]",
+            lost,
+            Vec::new(),
+            "kept",
+            Bar::AtMost(0.01),
+        ))
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {

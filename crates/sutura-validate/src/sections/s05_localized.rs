@@ -47,7 +47,8 @@ fn study(case: (f64, f64)) -> Study {
     let (shortening, turns) = case;
     let h = helix(case);
     let source = "closed form, long rod";
-    let error = move |o: &Outcome| envelope(o, &h).iter().map(|(x, f)| (f - x.tanh().powi(2)).abs()).fold(f64::NAN, f64::max);
+    let error =
+        move |o: &Outcome| envelope(o, &h).iter().map(|(x, f)| (f - x.tanh().powi(2)).abs()).fold(f64::NAN, f64::max);
     let lost = move |o: &Outcome| {
         let n = o.report.threads.first().map_or(f64::NAN, |t| t.elements as f64);
         // Twist counts from the middle of the first element to that of the last one.
@@ -58,9 +59,25 @@ fn study(case: (f64, f64)) -> Study {
         .set("phase.together.action[0].keys[0].by", vector([-shortening, 0.0, 0.0]))
         .set("phase.turn.action[1].keys[0].turn.angle", format!("{:e}", turns * TAU))
         .elements("rod", &[100, 200, 400])
-        .quantity(Quantity::last("tension [mN]", "tension", 1e3, 1e3 * h.tension * T1.ei() / (LENGTH * LENGTH), source, Bar::Within(0.02)))
-        .quantity(Quantity::last("torque [mN m]", "torque", 1e3, 1e3 * h.moment * T1.ei() / LENGTH, source, Bar::Within(0.02)))
-        .quantity(Quantity::measured("largest error of the envelope", error, vec![0.0], source, Bar::Within(0.02)).scale(1.0))
+        .quantity(Quantity::last(
+            "tension [mN]",
+            "tension",
+            1e3,
+            1e3 * h.tension * T1.ei() / (LENGTH * LENGTH),
+            source,
+            Bar::Within(0.02),
+        ))
+        .quantity(Quantity::last(
+            "torque [mN m]",
+            "torque",
+            1e3,
+            1e3 * h.moment * T1.ei() / LENGTH,
+            source,
+            Bar::Within(0.02),
+        ))
+        .quantity(
+            Quantity::measured("largest error of the envelope", error, vec![0.0], source, Bar::Within(0.02)).scale(1.0),
+        )
         .quantity(Quantity::measured("turns lost of twist + writhe", lost, Vec::new(), "conserved", Bar::AtMost(0.01)))
         .quantity(Quantity::measured(
             "largest change of twist + writhe in a frame [turns]",

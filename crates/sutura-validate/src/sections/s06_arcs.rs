@@ -18,7 +18,8 @@ pub fn section() -> Section {
     for (k, angle) in [(1.0, FRAC_PI_4), (3.6, FRAC_PI_4), (7.2, FRAC_PI_4), (1.0, FRAC_PI_2)] {
         section.studies.push(monofilament(k, angle));
     }
-    // A diameter of 2 keeps shear and stretch as small as they are in the literature's rod; E then follows from EI. It is light, so that it comes to rest soon.
+    // A diameter of 2 keeps shear and stretch as small as they are in the literature's rod; E then follows from EI. It
+    // is light, so that it comes to rest soon.
     let thin = Rod { diameter: 2.0, young: 1e7 / 12.0 * 4.0 / PI, poisson: 0.0, density: 1e-6 };
     for load in [300.0, 450.0, 600.0] {
         section.studies.push(arc(
@@ -34,7 +35,13 @@ pub fn section() -> Section {
     for load in [300.0, 450.0, 600.0] {
         section.studies.push(square(load, thin.density));
     }
-    section.studies.push(independence("k = 7.2, other settings", 0.1, monofilament(7.2, FRAC_PI_4), "height of the tip [mm]", |o| 1e3 * last(o, "tip.z")));
+    section.studies.push(independence(
+        "k = 7.2, other settings",
+        0.1,
+        monofilament(7.2, FRAC_PI_4),
+        "height of the tip [mm]",
+        |o| 1e3 * last(o, "tip.z"),
+    ));
     section
 }
 
@@ -42,16 +49,37 @@ pub fn section() -> Section {
 fn square(load: f64, density: f64) -> Study {
     let rod = Rod { diameter: 1.0, young: 1e7, poisson: 0.0, density };
     let ei = rod.young / 12.0;
-    let mut study = arc(format!("R = 100, unit square, P = {load}"), rod, [ei, ei, 0.5 * rod.young * SQUARE], 100.0, FRAC_PI_4, load * 1e4 / ei, load == 600.0)
-        .set("thread.rod.section", "{ rectangle = [1, 1] }");
+    let mut study = arc(
+        format!("R = 100, unit square, P = {load}"),
+        rod,
+        [ei, ei, 0.5 * rod.young * SQUARE],
+        100.0,
+        FRAC_PI_4,
+        load * 1e4 / ei,
+        load == 600.0,
+    )
+    .set("thread.rod.section", "{ rectangle = [1, 1] }");
     if load == 600.0 {
         for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
             let name = probe.replace('.', " ");
             // Where the tip is without load, and its displacement. Errors over the length moved.
             let ibrahimbegovic = [100.0 * (1.0 - FRAC_PI_4.cos()) - 13.729, 100.0 * FRAC_PI_4.sin() - 23.814, 53.605];
             study = study
-                .quantity(Quantity::last(name.clone(), probe, 1.0, ibrahimbegovic[i], "Ibrahimbegovic 1995", Bar::Within(0.001)).scale(60.0))
-                .quantity(Quantity::last(name, probe, 1.0, [15.56, 46.90, 53.60][i], "Exudyn", Bar::Within(0.001)).scale(60.0));
+                .quantity(
+                    Quantity::last(
+                        name.clone(),
+                        probe,
+                        1.0,
+                        ibrahimbegovic[i],
+                        "Ibrahimbegovic 1995",
+                        Bar::Within(0.001),
+                    )
+                    .scale(60.0),
+                )
+                .quantity(
+                    Quantity::last(name, probe, 1.0, [15.56, 46.90, 53.60][i], "Exudyn", Bar::Within(0.001))
+                        .scale(60.0),
+                );
         }
     }
     study
@@ -88,7 +116,14 @@ fn arc(name: String, rod: Rod, stiffness: [f64; 3], radius: f64, angle: f64, k: 
         .quick(quick);
     for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
         let name = format!("{} / R", probe.replace('.', " "));
-        study = study.quantity(Quantity::last(name, probe, 1.0 / radius, exact[i] / radius, "shooting", Bar::Order(0.005, 1.8)));
+        study = study.quantity(Quantity::last(
+            name,
+            probe,
+            1.0 / radius,
+            exact[i] / radius,
+            "shooting",
+            Bar::Order(0.005, 1.8),
+        ));
     }
     study
 }

@@ -50,25 +50,31 @@ fn stiffness(angle: f64) -> Study {
     let length = TAU * RADIUS * TURNS / cos;
     let compliance = length * RADIUS * RADIUS * (cos * cos / T1.gj() + sin * sin / T1.ei());
     let height = length * sin;
-    spring(format!("spring, pitch angle {angle} degrees"), angle, FORCE).quick(angle == 10.0).quantity(Quantity::measured(
-        "stiffness [N/m]",
-        move |o| FORCE / (last(o, "tip.z") - height),
-        vec![1.0 / compliance],
-        "compliance of a helix",
-        Bar::Order(0.01, 1.8),
-    ))
+    spring(format!("spring, pitch angle {angle} degrees"), angle, FORCE).quick(angle == 10.0).quantity(
+        Quantity::measured(
+            "stiffness [N/m]",
+            move |o| FORCE / (last(o, "tip.z") - height),
+            vec![1.0 / compliance],
+            "compliance of a helix",
+            Bar::Order(0.01, 1.8),
+        ),
+    )
 }
 
-/// The end kept from turning about the axis, by the torque about it that undoes the turn: the compliances of a helix are, over L, R^2 (cos^2 / GJ
-/// + sin^2 / EI) of length to force, sin^2 / GJ + cos^2 / EI of turn to torque, R sin cos (1 / GJ - 1 / EI) between them.
+/// The end kept from turning about the axis, by the torque about it that undoes the turn: the compliances of a helix
+/// are, over L, R^2 (cos^2 / GJ + sin^2 / EI) of length to force, sin^2 / GJ + cos^2 / EI of turn to torque, R sin cos
+/// (1 / GJ - 1 / EI) between them.
 fn blocked(angle: f64) -> Study {
     const FORCE: f64 = 1e-6;
     let (sin, cos) = angle.to_radians().sin_cos();
     let length = TAU * RADIUS * TURNS / cos;
     let (bend, twist) = (1.0 / T1.ei(), 1.0 / T1.gj());
-    let [force, both, torque] =
-        [RADIUS * RADIUS * (cos * cos * twist + sin * sin * bend), RADIUS * sin * cos * (twist - bend), sin * sin * twist + cos * cos * bend]
-            .map(|c| length * c);
+    let [force, both, torque] = [
+        RADIUS * RADIUS * (cos * cos * twist + sin * sin * bend),
+        RADIUS * sin * cos * (twist - bend),
+        sin * sin * twist + cos * cos * bend,
+    ]
+    .map(|c| length * c);
     let height = length * sin;
     spring(format!("spring, pitch angle {angle} degrees, end kept from turning"), angle, FORCE)
         .set("phase.load.action[0].torque", vector([0.0, RADIUS * FORCE, -both / torque * FORCE]))
@@ -101,7 +107,9 @@ fn stretched(force: f64) -> Study {
     for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
         let name = format!("{} [mm]", probe.replace('.', " "));
         // Errors over the height of the spring.
-        study = study.quantity(Quantity::last(name, probe, 1e3, 1e3 * tip[i], "shooting", Bar::Order(0.01, 1.8)).scale(1e3 * tip[2]));
+        study = study.quantity(
+            Quantity::last(name, probe, 1e3, 1e3 * tip[i], "shooting", Bar::Order(0.01, 1.8)).scale(1e3 * tip[2]),
+        );
     }
     study
 }
@@ -145,7 +153,9 @@ fn ring(seam: f64) -> Study {
     let opened = move |probe: &'static str| move |o: &Outcome| factor * (last(o, probe) - first(o, probe));
     let level = |n: u32| {
         let place = |quarter: u32| (f64::from(n) * seam) as u32 + quarter * n / 4;
-        let between = |a: u32, b: u32| format!("\"norm(position(ring.particle[{}]) - position(ring.particle[{}]))\"", place(a) % n, place(b) % n);
+        let between = |a: u32, b: u32| {
+            format!("\"norm(position(ring.particle[{}]) - position(ring.particle[{}]))\"", place(a) % n, place(b) % n)
+        };
         // From the first place to the start, a part of a turn back.
         let (sin, cos) = (TAU * seam).sin_cos();
         let settings = [
@@ -158,13 +168,28 @@ fn ring(seam: f64) -> Study {
         ];
         Level::new(n.to_string(), 1.0 / f64::from(n), &settings)
     };
-    let name =
-        if seam == 0.0 { "closed ring pulled apart at its seam".into() } else { format!("closed ring pulled apart, its seam {} degrees off", 360.0 * seam) };
+    let name = if seam == 0.0 {
+        "closed ring pulled apart at its seam".into()
+    } else {
+        format!("closed ring pulled apart, its seam {} degrees off", 360.0 * seam)
+    };
     Study::new(name, "ring_pulled")
         .levels([40, 80, 160].map(level).into())
         .quick(seam > 0.0)
-        .quantity(Quantity::measured("opening over F R^3 / EI", opened("along"), vec![0.25 * PI - 2.0 / PI], "Castigliano", Bar::Order(0.005, 1.8)))
-        .quantity(Quantity::measured("closing over F R^3 / EI", opened("across"), vec![0.5 - 2.0 / PI], "Castigliano", Bar::Order(0.005, 1.8)))
+        .quantity(Quantity::measured(
+            "opening over F R^3 / EI",
+            opened("along"),
+            vec![0.25 * PI - 2.0 / PI],
+            "Castigliano",
+            Bar::Order(0.005, 1.8),
+        ))
+        .quantity(Quantity::measured(
+            "closing over F R^3 / EI",
+            opened("across"),
+            vec![0.5 - 2.0 / PI],
+            "Castigliano",
+            Bar::Order(0.005, 1.8),
+        ))
 }
 
 fn first(outcome: &Outcome, probe: &str) -> f64 {

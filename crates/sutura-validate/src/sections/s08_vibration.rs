@@ -59,7 +59,10 @@ pub(super) fn shaped(n: usize, length: f64, shape: impl Fn(f64) -> f64) -> Strin
 
 fn timed(study: Study, h: f64, periods: f64, w: f64) -> Study {
     let frames = 1.0 / h;
-    study.set("solver.substep", format!("{h:e}")).set("frame_rate", format!("{frames:e}")).set("phase.swing.duration", format!("{:e}", periods * TAU / w))
+    study
+        .set("solver.substep", format!("{h:e}"))
+        .set("frame_rate", format!("{frames:e}"))
+        .set("phase.swing.duration", format!("{:e}", periods * TAU / w))
 }
 
 fn level(n: usize, points: String) -> Level {
@@ -92,7 +95,13 @@ fn cantilever_decay() -> Study {
     const N: usize = 40;
     let beta = vibration::cantilever(1)[0];
     let w = bending(links::cantilever_modes(N)[0].0);
-    let levels = STEPS.map(|h| Level::new(format!("{} ms", 1e3 * h), h, &[("solver.substep", format!("{h:e}")), ("frame_rate", format!("{:e}", 1.0 / h))]));
+    let levels = STEPS.map(|h| {
+        Level::new(
+            format!("{} ms", 1e3 * h),
+            h,
+            &[("solver.substep", format!("{h:e}")), ("frame_rate", format!("{:e}", 1.0 / h))],
+        )
+    });
     Study::new("cantilever, decay of mode 1", "vibrating")
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
         .levels(levels.into())
@@ -114,7 +123,13 @@ fn free(mode: usize, h: f64) -> Study {
     timed(Study::new(format!("free rod, mode {}", mode + 1), "vibrating_free"), h, 6.0, w)
         .levels(levels.into())
         .quantity(measured(vec![hz(w, h)], "Euler and Bernoulli", Bar::Order(0.005, 1.8)))
-        .quantity(Quantity::measured("largest momentum over that of its speed", largest_momentum(w), Vec::new(), "none", Bar::AtMost(0.01)))
+        .quantity(Quantity::measured(
+            "largest momentum over that of its speed",
+            largest_momentum(w),
+            Vec::new(),
+            "none",
+            Bar::AtMost(0.01),
+        ))
 }
 
 /// Momentum over mass times the largest speed of the tip.
@@ -135,10 +150,17 @@ fn string(mode: u32) -> Study {
     let shape = move |n| shaped(n, stretched, |s| (f64::from(mode) * PI * s).sin() * 0.1);
     timed(Study::new(format!("stiff string, 100 mm, 0.1 N, mode {mode}"), "string"), h, 6.0, TAU * f)
         .levels(COUNTS.map(|n| level(n, shape(n))).into())
-        .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "bow")), vec![hz(TAU * f, h)], "stiff string", Bar::Order(0.005, 1.8)))
+        .quantity(Quantity::measured(
+            "frequency [Hz]",
+            |o| frequency(&series(o, "bow")),
+            vec![hz(TAU * f, h)],
+            "stiff string",
+            Bar::Order(0.005, 1.8),
+        ))
 }
 
-/// A closed ring, round at rest, in a mode of so many waves in or across its plane (Love 1927, 293; no stretch, no rotary inertia).
+/// A closed ring, round at rest, in a mode of so many waves in or across its plane (Love 1927, 293; no stretch, no
+/// rotary inertia).
 fn ring(waves: u32, across: bool) -> Study {
     const R: f64 = 0.02;
     const H: f64 = 5e-5;
@@ -151,12 +173,15 @@ fn ring(waves: u32, across: bool) -> Study {
             let s = TAU * i as f64 / elements as f64;
             let (sin, cos) = (n * s).sin_cos();
             // In the plane points move along the ring, too, and keep their distance.
-            let (radius, angle, z) = if across { (R, s, R * HEIGHT * cos) } else { (R * (1.0 + HEIGHT * cos), s - HEIGHT / n * sin, 0.0) };
+            let (radius, angle, z) =
+                if across { (R, s, R * HEIGHT * cos) } else { (R * (1.0 + HEIGHT * cos), s - HEIGHT / n * sin, 0.0) };
             vector([radius * angle.cos(), radius * angle.sin(), z])
         };
         format!("[{}]", (0..elements).map(point).collect::<Vec<_>>().join(", "))
     };
-    let level = |elements: usize| Level::new(elements.to_string(), 1.0 / elements as f64, &[("thread.ring.points", shape(elements))]);
+    let level = |elements: usize| {
+        Level::new(elements.to_string(), 1.0 / elements as f64, &[("thread.ring.points", shape(elements))])
+    };
     let swing = move |o: &sutura_scene::Outcome| {
         let start = columns(o, "start", ["time", "x", "z"]);
         frequency(&start.iter().map(|[t, x, z]| (*t, if across { *z } else { x - R })).collect::<Vec<_>>())
@@ -167,22 +192,37 @@ fn ring(waves: u32, across: bool) -> Study {
     timed(Study::new(format!("closed ring, {waves} waves {word} its plane"), "vibrating_ring"), H, 6.0, w)
         .levels([24, 48, 96].map(level).into())
         .quick(waves == 2 && !across)
-        .quantity(Quantity::measured("frequency [Hz]", swing, vec![hz(w, H)], "inextensible ring", Bar::Order(0.005, 1.8)))
-        .quantity(Quantity::measured("largest momentum over that of its speed", push, Vec::new(), "none", Bar::AtMost(0.01)))
+        .quantity(Quantity::measured(
+            "frequency [Hz]",
+            swing,
+            vec![hz(w, H)],
+            "inextensible ring",
+            Bar::Order(0.005, 1.8),
+        ))
+        .quantity(Quantity::measured(
+            "largest momentum over that of its speed",
+            push,
+            Vec::new(),
+            "none",
+            Bar::AtMost(0.01),
+        ))
 }
 
 fn tip_mass() -> Study {
     // Massless beam with the mass at its end, and 33/140 of the beam's own (Rayleigh); exact to 0.1 % for this ratio.
     let mass = 1e-5 + 33.0 / 140.0 * T1.mass() * LENGTH;
     let w = (3.0 * T1.ei() / (mass * LENGTH.powi(3))).sqrt();
-    let swing = |o: &sutura_scene::Outcome| frequency(&series(o, "tip").into_iter().filter(|p| p.0 > 1.6).collect::<Vec<_>>());
-    Study::new("cantilever with 10 mg at its tip", "tip_mass").elements("rod", &[20, 40, 80]).quantity(Quantity::measured(
-        "frequency [Hz]",
-        swing,
-        vec![hz(w, 5e-4)],
-        "Rayleigh, 33/140 of the rod's mass",
-        Bar::Order(0.005, 1.8),
-    ))
+    let swing =
+        |o: &sutura_scene::Outcome| frequency(&series(o, "tip").into_iter().filter(|p| p.0 > 1.6).collect::<Vec<_>>());
+    Study::new("cantilever with 10 mg at its tip", "tip_mass").elements("rod", &[20, 40, 80]).quantity(
+        Quantity::measured(
+            "frequency [Hz]",
+            swing,
+            vec![hz(w, 5e-4)],
+            "Rayleigh, 33/140 of the rod's mass",
+            Bar::Order(0.005, 1.8),
+        ),
+    )
 }
 
 fn bob() -> Study {
@@ -190,8 +230,14 @@ fn bob() -> Study {
     let inertia = 1e-9 + T1.mass() * T1.diameter.powi(2) / 8.0 * L / 3.0;
     let w = (T1.gj() / (inertia * L)).sqrt();
     Study::new("torsion pendulum, 100 mm, 1e-9 kg m^2", "bob").elements("rod", &[20, 40, 80]).quantity(
-        Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "turn")), vec![hz(w, 2e-4)], "GJ / (J L)", Bar::Within(0.005))
-            .because("the inertia is on the last frame, half an element before the end: first order in the element length"),
+        Quantity::measured(
+            "frequency [Hz]",
+            |o| frequency(&series(o, "turn")),
+            vec![hz(w, 2e-4)],
+            "GJ / (J L)",
+            Bar::Within(0.005),
+        )
+        .because("the inertia is on the last frame, half an element before the end: first order in the element length"),
     )
 }
 
@@ -228,14 +274,18 @@ fn axial() -> Study {
 }
 
 fn plots(studies: &[StudyResult]) -> Vec<Plot> {
-    let ours = studies.iter().find(|s| s.name == "cantilever, decay of mode 1").map_or_else(Vec::new, |s| s.curve.clone());
+    let ours =
+        studies.iter().find(|s| s.name == "cantilever, decay of mode 1").map_or_else(Vec::new, |s| s.curve.clone());
     let (w, h) = (bending(links::cantilever_modes(40)[0].0), 2.5e-4);
-    let theory: Vec<(f64, f64)> = ours.iter().map(|(t, _)| (*t, (-euler_decay(w, h) * t).exp() * (euler_frequency(w, h) * t).cos())).collect();
+    let theory: Vec<(f64, f64)> =
+        ours.iter().map(|(t, _)| (*t, (-euler_decay(w, h) * t).exp() * (euler_frequency(w, h) * t).cos())).collect();
     let spectrum = |points: &[(f64, f64)], step: f64| -> Vec<(f64, f64)> {
         (0..=(60.0 / step) as u32)
             .map(|i| step * f64::from(i))
             .map(|f| {
-                let (c, s) = points.iter().fold((0.0, 0.0), |(c, s), (t, z)| (c + z * (TAU * f * t).cos(), s + z * (TAU * f * t).sin()));
+                let (c, s) = points
+                    .iter()
+                    .fold((0.0, 0.0), |(c, s), (t, z)| (c + z * (TAU * f * t).cos(), s + z * (TAU * f * t).sin()));
                 (f, c.hypot(s) * 2.0 / points.len().max(1) as f64)
             })
             .collect()

@@ -66,7 +66,8 @@ fn sliding(mu: f64, degrees: f64) -> Study {
 
 fn held(part: f64) -> Study {
     let force = part * 0.1 * (0.2 * PI).exp();
-    let study = Study::new(format!("held at {part} of the limit, 60 s"), "capstan_hold").set("phase.pull.action[0].force", vector([0.0, 0.0, -force]));
+    let study = Study::new(format!("held at {part} of the limit, 60 s"), "capstan_hold")
+        .set("phase.pull.action[0].force", vector([0.0, 0.0, -force]));
     let moved = |o: &Outcome| {
         let slid: Vec<f64> = series(o, "slid").into_iter().filter(|p| p.0 >= 2.5).map(|p| p.1).collect();
         1e3 * slid.iter().map(|s| (s - slid[0]).abs()).fold(0.0, f64::max)
@@ -74,7 +75,13 @@ fn held(part: f64) -> Study {
     if part < 1.0 {
         study.quantity(Quantity::measured("creep [mm]", moved, Vec::new(), "none", Bar::AtMost(0.01)))
     } else {
-        study.quantity(Quantity::measured("slid at the end [mm]", |o| 1e3 * (crate::study::last(o, "slid") - 0.035), Vec::new(), "slides", Bar::AtLeast(3.0)))
+        study.quantity(Quantity::measured(
+            "slid at the end [mm]",
+            |o| 1e3 * (crate::study::last(o, "slid") - 0.035),
+            Vec::new(),
+            "slides",
+            Bar::AtLeast(3.0),
+        ))
     }
 }
 
@@ -86,6 +93,15 @@ fn plots(studies: &[StudyResult]) -> Vec<Plot> {
     });
     let mut ours: Vec<(f64, f64)> = found.collect();
     ours.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let curves = vec![Curve { name: "exp(mu phi)".into(), points: exact, dots: false }, Curve { name: "ours".into(), points: ours, dots: true }];
-    vec![Plot { file: "capstan", title: "Ratio of the forces of a thread that slides around a cylinder".into(), x: ("mu phi", ""), y: ("T2 / T1", ""), curves }]
+    let curves = vec![
+        Curve { name: "exp(mu phi)".into(), points: exact, dots: false },
+        Curve { name: "ours".into(), points: ours, dots: true },
+    ];
+    vec![Plot {
+        file: "capstan",
+        title: "Ratio of the forces of a thread that slides around a cylinder".into(),
+        x: ("mu phi", ""),
+        y: ("T2 / T1", ""),
+        curves,
+    }]
 }

@@ -19,9 +19,17 @@ pub fn section() -> Section {
     let trefoil = |n: usize| curves::torus_knot(3, n).into_iter().map(DVec3::from).collect::<Vec<_>>();
     let mut study = Study::direct("torus trefoil").quick(true);
     for (n, value) in POLYGONS {
-        study = study.quantity(Quantity::measured(format!("writhe, {n} points"), move |_| writhe(&trefoil(n), true), vec![value], "Python", Bar::Within(1e-6)));
+        study = study.quantity(Quantity::measured(
+            format!("writhe, {n} points"),
+            move |_| writhe(&trefoil(n), true),
+            vec![value],
+            "Python",
+            Bar::Within(1e-6),
+        ));
     }
-    let mirrored = move |_: &sutura_scene::Outcome| writhe(&trefoil(100).iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect::<Vec<_>>(), true);
+    let mirrored = move |_: &sutura_scene::Outcome| {
+        writhe(&trefoil(100).iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect::<Vec<_>>(), true)
+    };
     study = study
         .quantity(Quantity::measured(
             "writhe, 800 points",
@@ -30,10 +38,18 @@ pub fn section() -> Section {
             "double integral",
             Bar::Within(1e-4),
         ))
-        .quantity(Quantity::measured("writhe of its mirror image, 100 points", mirrored, vec![-3.333_206], "Python", Bar::Within(1e-6)));
+        .quantity(Quantity::measured(
+            "writhe of its mirror image, 100 points",
+            mirrored,
+            vec![-3.333_206],
+            "Python",
+            Bar::Within(1e-6),
+        ));
     section.studies.push(study);
 
-    let circle = |n: usize| (0..n).map(|i| TAU * i as f64 / n as f64).map(|t| DVec3::new(t.cos(), t.sin(), 0.0)).collect::<Vec<_>>();
+    let circle = |n: usize| {
+        (0..n).map(|i| TAU * i as f64 / n as f64).map(|t| DVec3::new(t.cos(), t.sin(), 0.0)).collect::<Vec<_>>()
+    };
     // A coil around the circle.
     let coil = move |turns: f64| {
         let point = |t: f64| {
@@ -46,8 +62,13 @@ pub fn section() -> Section {
     for turns in [-3.0, -1.0, 1.0, 7.0] {
         // Up on the outside is a left-handed coil of positive angle.
         let measure = move |_: &sutura_scene::Outcome| gauss_linking(&circle(200), &coil(turns)).abs();
-        study =
-            study.quantity(Quantity::measured(format!("size of the linking number, {turns} turns"), measure, vec![turns.abs()], "whole", Bar::Within(1e-9)));
+        study = study.quantity(Quantity::measured(
+            format!("size of the linking number, {turns} turns"),
+            measure,
+            vec![turns.abs()],
+            "whole",
+            Bar::Within(1e-9),
+        ));
     }
     section.studies.push(study);
     section

@@ -33,13 +33,17 @@ pub fn section() -> Section {
     );
     for (throws, name, determinant, signature) in THROWS {
         let title = format!("throws {}", throws.iter().map(|c| format!("{c:+}")).collect::<Vec<_>>().join(" "));
-        section.studies.push(knot(title, curves::stacked_throws(throws), name, determinant, signature).quick(throws.len() == 2));
+        section
+            .studies
+            .push(knot(title, curves::stacked_throws(throws), name, determinant, signature).quick(throws.len() == 2));
     }
     section.studies.push(knot("figure-eight".into(), curves::figure_eight(200), "figure-eight", 5.0, 0.0));
     section.studies.push(knot("torus knot 7".into(), curves::torus_knot(7, 300), "", 7.0, -6.0));
     section.studies.push(knot("torus knot 9".into(), curves::torus_knot(9, 300), "", 9.0, -8.0));
-    section.left_out =
-        &[LeftOut { what: "knots while they are tied, open ends", why: "in the tests of the engine (crates/sutura/tests/knots.rs) and the sample scenes" }];
+    section.left_out = &[LeftOut {
+        what: "knots while they are tied, open ends",
+        why: "in the tests of the engine (crates/sutura/tests/knots.rs) and the sample scenes",
+    }];
     section
 }
 
@@ -67,12 +71,26 @@ fn knot(title: String, points: Vec<[f64; 3]>, name: &'static str, determinant: f
             Bar::Within(0.0),
         ))
         .quantity(
-            Quantity::measured("signature", move |_| worst(&second, &|r| f64::from(r.signature), signature), vec![signature], "KnotInfo", Bar::Within(0.0))
-                .scale(1.0),
+            Quantity::measured(
+                "signature",
+                move |_| worst(&second, &|r| f64::from(r.signature), signature),
+                vec![signature],
+                "KnotInfo",
+                Bar::Within(0.0),
+            )
+            .scale(1.0),
         );
     if !name.is_empty() {
-        let right = move |_: &sutura_scene::Outcome| third.iter().filter(|r| r.knot.name() == name).count() as f64 / f64::from(TURNS);
-        study = study.quantity(Quantity::measured(format!("part recognized as {name}"), right, vec![1.0], "known", Bar::Within(0.0)));
+        let right = move |_: &sutura_scene::Outcome| {
+            third.iter().filter(|r| r.knot.name() == name).count() as f64 / f64::from(TURNS)
+        };
+        study = study.quantity(Quantity::measured(
+            format!("part recognized as {name}"),
+            right,
+            vec![1.0],
+            "known",
+            Bar::Within(0.0),
+        ));
     }
     study
 }

@@ -35,7 +35,10 @@ fn rates() -> Vec<Level> {
 
 /// Columns x, y, z of a probe at a time.
 fn at(outcome: &Outcome, probe: &str, time: f64) -> [f64; 3] {
-    columns(outcome, probe, ["time", "x", "y", "z"]).into_iter().find(|r| (r[0] - time).abs() < 1e-9).map_or([f64::NAN; 3], |r| [r[1], r[2], r[3]])
+    columns(outcome, probe, ["time", "x", "y", "z"])
+        .into_iter()
+        .find(|r| (r[0] - time).abs() < 1e-9)
+        .map_or([f64::NAN; 3], |r| [r[1], r[2], r[3]])
 }
 
 fn falling() -> Study {
@@ -52,10 +55,34 @@ fn falling() -> Study {
     Study::new("free fall, then damping 0.5", "free_fall")
         .levels(rates())
         .quick(true)
-        .quantity(Quantity::measured("fallen in 0.5 s [m]", |o| -at(o, "place", 0.5)[2], fallen, "sum", Bar::Within(1e-9)))
-        .quantity(Quantity::measured("speed after 0.5 s [m/s]", |o| -at(o, "velocity", 0.5)[2], vec![0.5 * GRAVITY], "g t", Bar::Within(1e-9)))
-        .quantity(Quantity::measured("speed a second later [m/s]", |o| -last(o, "velocity.z"), vec![0.25 * GRAVITY], "(1 - d)^t", Bar::Within(1e-9)))
-        .quantity(Quantity::measured("coasted in it [m]", |o| at(o, "place", 0.5)[2] - last(o, "place.z"), coasted, "geometric sum", Bar::Within(1e-9)))
+        .quantity(Quantity::measured(
+            "fallen in 0.5 s [m]",
+            |o| -at(o, "place", 0.5)[2],
+            fallen,
+            "sum",
+            Bar::Within(1e-9),
+        ))
+        .quantity(Quantity::measured(
+            "speed after 0.5 s [m/s]",
+            |o| -at(o, "velocity", 0.5)[2],
+            vec![0.5 * GRAVITY],
+            "g t",
+            Bar::Within(1e-9),
+        ))
+        .quantity(Quantity::measured(
+            "speed a second later [m/s]",
+            |o| -last(o, "velocity.z"),
+            vec![0.25 * GRAVITY],
+            "(1 - d)^t",
+            Bar::Within(1e-9),
+        ))
+        .quantity(Quantity::measured(
+            "coasted in it [m]",
+            |o| at(o, "place", 0.5)[2] - last(o, "place.z"),
+            coasted,
+            "geometric sum",
+            Bar::Within(1e-9),
+        ))
 }
 
 fn terminal() -> Study {
@@ -69,7 +96,13 @@ fn terminal() -> Study {
         .set("phase.coast.action[0].gravity", "[0, 0, -9.81]")
         .set("phase.coast.action[1].solver.linear_damping", 0.9)
         .set("phase.coast.duration", "14 s")
-        .quantity(Quantity::measured("speed [m/s]", |o| -last(o, "velocity.z"), speed.to_vec(), "damping after gravity", Bar::Within(1e-9)))
+        .quantity(Quantity::measured(
+            "speed [m/s]",
+            |o| -last(o, "velocity.z"),
+            speed.to_vec(),
+            "damping after gravity",
+            Bar::Within(1e-9),
+        ))
 }
 
 fn spring() -> Study {
@@ -87,9 +120,10 @@ fn spring() -> Study {
         }
         worst / START
     };
-    Study::new("one spring, 2000 substeps", "spring_mass")
-        .quick(true)
-        .quantity(Quantity::measured("largest difference over the start", worst, vec![0.0], "recursion", Bar::Within(1e-6)).scale(1.0))
+    Study::new("one spring, 2000 substeps", "spring_mass").quick(true).quantity(
+        Quantity::measured("largest difference over the start", worst, vec![0.0], "recursion", Bar::Within(1e-6))
+            .scale(1.0),
+    )
 }
 
 fn spinning() -> Study {
@@ -108,14 +142,27 @@ fn spinning() -> Study {
         end / first
     };
     let drift = |o: &Outcome| {
-        let rows: Vec<[f64; 4]> = columns(o, "momentum", ["time", "x", "y", "z"]).into_iter().filter(|r| r[0] > 0.0105).collect();
+        let rows: Vec<[f64; 4]> =
+            columns(o, "momentum", ["time", "x", "y", "z"]).into_iter().filter(|r| r[0] > 0.0105).collect();
         let Some(first) = rows.first().copied() else { return f64::NAN };
         let size = first[1].hypot(first[3]);
         rows.iter().map(|r| (1..4).map(|k| (r[k] - first[k]).powi(2)).sum::<f64>().sqrt() / size).fold(0.0, f64::max)
     };
     Study::new("spinning dumbbell, 1 s", "spinning")
-        .quantity(Quantity::measured("last angle of a substep over the first", ratio, vec![1.0], "conserved", Bar::Within(1e-3)))
-        .quantity(Quantity::measured("drift of the momentum over it", drift, Vec::new(), "conserved", Bar::AtMost(1e-10)))
+        .quantity(Quantity::measured(
+            "last angle of a substep over the first",
+            ratio,
+            vec![1.0],
+            "conserved",
+            Bar::Within(1e-3),
+        ))
+        .quantity(Quantity::measured(
+            "drift of the momentum over it",
+            drift,
+            Vec::new(),
+            "conserved",
+            Bar::AtMost(1e-10),
+        ))
 }
 
 fn pendulum() -> Study {

@@ -23,8 +23,10 @@ pub fn section() -> Section {
     section.studies.push(directions());
     section.studies.push(drawn());
     section.studies.push(stopped());
-    section.left_out =
-        &[LeftOut { what: "spheres and cylinders that roll", why: "there are no free rigid bodies; threads slide and do not roll, see docs/theory.md 16" }];
+    section.left_out = &[LeftOut {
+        what: "spheres and cylinders that roll",
+        why: "there are no free rigid bodies; threads slide and do not roll, see docs/theory.md 16",
+    }];
     section
 }
 
@@ -64,15 +66,29 @@ fn sliding(degrees: f64) -> Study {
         .set("phase.tilted.action[0].gravity", tilted(degrees, 0.0))
         .substeps(&STEPS)
         .quick(degrees == 20.0)
-        .quantity(Quantity::measured("moved in 0.5 s [mm]", |o| 1e3 * moved(o), sum.map(|x| 1e3 * x).to_vec(), "Coulomb", Bar::Within(0.01)))
+        .quantity(Quantity::measured(
+            "moved in 0.5 s [mm]",
+            |o| 1e3 * moved(o),
+            sum.map(|x| 1e3 * x).to_vec(),
+            "Coulomb",
+            Bar::Within(0.01),
+        ))
 }
 
 /// Downhill in several directions to the thread.
 fn directions() -> Study {
-    let level = |direction: f64| Level::new(format!("{direction} degrees"), 0.0, &[("phase.tilted.action[0].gravity", tilted(20.0, direction))]);
+    let level = |direction: f64| {
+        Level::new(format!("{direction} degrees"), 0.0, &[("phase.tilted.action[0].gravity", tilted(20.0, direction))])
+    };
     Study::new("20 degrees, downhill at an angle to the thread", "incline")
         .levels([0.0, 15.0, 30.0, 45.0, 90.0].map(level).into())
-        .quantity(Quantity::measured("moved in 0.5 s [mm]", |o| 1e3 * moved(o), Vec::new(), "each other", Bar::Same(0.01)))
+        .quantity(Quantity::measured(
+            "moved in 0.5 s [mm]",
+            |o| 1e3 * moved(o),
+            Vec::new(),
+            "each other",
+            Bar::Same(0.01),
+        ))
 }
 
 fn drawn() -> Study {
@@ -81,7 +97,13 @@ fn drawn() -> Study {
         let late: Vec<f64> = series(o, "pull").into_iter().filter(|p| p.0 > 0.7).map(|p| p.1).collect();
         late.iter().sum::<f64>() / late.len() as f64
     };
-    Study::new("drawn lengthwise", "drawn").quantity(Quantity::measured("force over weight", move |o| mean(o) / weight, vec![MU], "mu w L", Bar::Within(0.01)))
+    Study::new("drawn lengthwise", "drawn").quantity(Quantity::measured(
+        "force over weight",
+        move |o| mean(o) / weight,
+        vec![MU],
+        "mu w L",
+        Bar::Within(0.01),
+    ))
 }
 
 /// Let go at 0.5 m/s.
@@ -108,6 +130,12 @@ fn stopped() -> Study {
     Study::new("let go at 0.5 m/s", "slide_to_stop")
         .substeps(&STEPS)
         .quantity(Quantity::measured("slides [mm]", distance, sum.to_vec(), "substeps of Coulomb", Bar::Within(0.001)))
-        .quantity(Quantity::measured("slides [mm]", distance, vec![1e3 * SPEED * SPEED / (2.0 * slowed)], "v^2 / 2 mu g", Bar::Order(0.01, 0.9)))
+        .quantity(Quantity::measured(
+            "slides [mm]",
+            distance,
+            vec![1e3 * SPEED * SPEED / (2.0 * slowed)],
+            "v^2 / 2 mu g",
+            Bar::Order(0.01, 0.9),
+        ))
         .quantity(Quantity::measured("slows down by [m/s^2]", slowing, vec![slowed], "mu g", Bar::Within(0.001)))
 }

@@ -42,7 +42,11 @@ fn exact(moment: f64) -> Station {
 }
 
 fn load(force: [f64; 3], torque: [f64; 3]) -> String {
-    format!("{{ load = \"tip\", at = \"end\", force = {}, torque = {}, ramp = \"2 s\" }}", vector(force), vector(torque))
+    format!(
+        "{{ load = \"tip\", at = \"end\", force = {}, torque = {}, ramp = \"2 s\" }}",
+        vector(force),
+        vector(torque)
+    )
 }
 
 fn twisted(moment: f64) -> Study {
@@ -53,12 +57,24 @@ fn twisted(moment: f64) -> Study {
         .quick(moment > 0.0);
     for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
         let name = format!("{} / L", probe.replace('.', " "));
-        study = study.quantity(Quantity::last(name, probe, 1.0 / LENGTH, tip.position[i] / LENGTH, "shooting", Bar::Order(0.01, 1.8)));
+        study = study.quantity(Quantity::last(
+            name,
+            probe,
+            1.0 / LENGTH,
+            tip.position[i] / LENGTH,
+            "shooting",
+            Bar::Order(0.01, 1.8),
+        ));
     }
     for (i, probe) in ["d1.x", "d1.y", "d1.z"].into_iter().enumerate() {
         let name = probe.replace('.', " at the tip, ");
-        let reason = "read in the last element, half an element from the tip, where a torque of first order in the element acts";
-        study = study.quantity(Quantity::last(name, probe, 1.0, tip.frame[0][i], "shooting", Bar::Order(0.01, 0.9)).scale(1.0).because(reason));
+        let reason =
+            "read in the last element, half an element from the tip, where a torque of first order in the element acts";
+        study = study.quantity(
+            Quantity::last(name, probe, 1.0, tip.frame[0][i], "shooting", Bar::Order(0.01, 0.9))
+                .scale(1.0)
+                .because(reason),
+        );
     }
     study
 }
@@ -74,18 +90,30 @@ fn roll() -> Study {
         .levels([0.0, 30.0, 45.0, 90.0].map(level).into());
     for probe in ["tip.x", "tip.y", "tip.z"] {
         let name = format!("{} / L", probe.replace('.', " "));
-        study = study.quantity(Quantity::measured(name, move |o| last(o, probe) / LENGTH, Vec::new(), "each other", Bar::Same(1e-6)).scale(1.0));
+        study = study.quantity(
+            Quantity::measured(name, move |o| last(o, probe) / LENGTH, Vec::new(), "each other", Bar::Same(1e-6))
+                .scale(1.0),
+        );
     }
     study
 }
 
-/// The whole scene turned: the rod along another direction, the load turned with it. The deflection along the load is the same.
+/// The whole scene turned: the rod along another direction, the load turned with it. The deflection along the load is
+/// the same.
 fn turned() -> Study {
     // Columns of a rotation: where x, y, z go.
     let level = |name: &str, axes: [[f64; 3]; 3]| {
         let along = axes[0].map(|c| c * LENGTH);
         let force = axes[2].map(|c| -1e-3 * c);
-        Level::new(name, 0.0, &[("thread.rod.line.to", vector(along)), ("thread.rod.d1", vector(axes[1])), ("phase.load.action[0]", load(force, [0.0; 3]))])
+        Level::new(
+            name,
+            0.0,
+            &[
+                ("thread.rod.line.to", vector(along)),
+                ("thread.rod.d1", vector(axes[1])),
+                ("phase.load.action[0]", load(force, [0.0; 3])),
+            ],
+        )
     };
     let (s, c) = 0.7_f64.sin_cos();
     let (u, v) = 1.1_f64.sin_cos();
@@ -95,7 +123,9 @@ fn turned() -> Study {
         level("x to -x", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]),
         level("oblique", [[c * v, s, -c * u], [-s * v, c, s * u], [u, 0.0, v]]),
     ];
-    let size = |o: &sutura_scene::Outcome| ["tip.x", "tip.y", "tip.z"].map(|p| last(o, p)).iter().map(|v| v * v).sum::<f64>().sqrt() / LENGTH;
+    let size = |o: &sutura_scene::Outcome| {
+        ["tip.x", "tip.y", "tip.z"].map(|p| last(o, p)).iter().map(|v| v * v).sum::<f64>().sqrt() / LENGTH
+    };
     Study::new("whole scene turned", "cantilever").levels(levels).quantity(Quantity::measured(
         "distance of the tip from the clamp / L",
         size,
@@ -105,7 +135,8 @@ fn turned() -> Study {
     ))
 }
 
-/// An ellipse that bends about d2 as the round thread does, and is four times as stiff about d1; rolled, or turning along the rod.
+/// An ellipse that bends about d2 as the round thread does, and is four times as stiff about d1; rolled, or turning
+/// along the rod.
 fn flat(degrees: f64, pretwist: f64) -> Study {
     let radius = 0.5 * T1.diameter;
     // Semi-axes a along d1 and 2a along d2: moments of area 2 pi a^4 and pi a^4 / 2, torsion constant 8 pi a^4 / 5,
@@ -123,7 +154,11 @@ fn flat(degrees: f64, pretwist: f64) -> Study {
     }
     .tip()
     .position;
-    let name = if pretwist == 0.0 { format!("flat section, rolled by {degrees} degrees") } else { "flat section, turning by 90 degrees".into() };
+    let name = if pretwist == 0.0 {
+        format!("flat section, rolled by {degrees} degrees")
+    } else {
+        "flat section, turning by 90 degrees".into()
+    };
     let mut study = Study::new(name, "cantilever")
         .set("thread.rod.section", format!("{{ ellipse = [{a:e}, {:e}] }}", 2.0 * a))
         .set("thread.rod.roll", format!("\"{degrees} deg\""))
@@ -133,7 +168,9 @@ fn flat(degrees: f64, pretwist: f64) -> Study {
         .quick(degrees == 30.0);
     for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
         let name = format!("{} / L", probe.replace('.', " "));
-        study = study.quantity(Quantity::last(name, probe, 1.0 / LENGTH, tip[i] / LENGTH, "shooting", Bar::Order(0.005, 1.8)).scale(1.0));
+        study = study.quantity(
+            Quantity::last(name, probe, 1.0 / LENGTH, tip[i] / LENGTH, "shooting", Bar::Order(0.005, 1.8)).scale(1.0),
+        );
     }
     study
 }

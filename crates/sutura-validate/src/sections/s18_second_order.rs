@@ -22,10 +22,38 @@ pub fn section() -> Section {
     );
     section.studies.push(cantilever());
     section.studies.push(pendulum());
-    section.studies.push(swing("free swing, drag 4/s, 2 s", "tr_bdf2", &[2, 4, 8, 16], 4.0, 120, Bar::Order(5e-4, 1.8)));
-    section.studies.push(swing("free swing, drag 4/s, 2 s, implicit Euler", "implicit_euler", &[4, 8, 16, 32], 4.0, 120, Bar::Order(0.015, 0.7)));
-    section.studies.push(swing("free swing, no drag, 0.5 s", "tr_bdf2", &[4, 8, 16, 32], 0.0, 30, Bar::Order(5e-4, 1.8)));
-    section.studies.push(swing("free swing, no drag, 0.5 s, implicit Euler", "implicit_euler", &[4, 16, 32, 64], 0.0, 30, Bar::Order(0.05, 0.7)));
+    section.studies.push(swing(
+        "free swing, drag 4/s, 2 s",
+        "tr_bdf2",
+        &[2, 4, 8, 16],
+        4.0,
+        120,
+        Bar::Order(5e-4, 1.8),
+    ));
+    section.studies.push(swing(
+        "free swing, drag 4/s, 2 s, implicit Euler",
+        "implicit_euler",
+        &[4, 8, 16, 32],
+        4.0,
+        120,
+        Bar::Order(0.015, 0.7),
+    ));
+    section.studies.push(swing(
+        "free swing, no drag, 0.5 s",
+        "tr_bdf2",
+        &[4, 8, 16, 32],
+        0.0,
+        30,
+        Bar::Order(5e-4, 1.8),
+    ));
+    section.studies.push(swing(
+        "free swing, no drag, 0.5 s, implicit Euler",
+        "implicit_euler",
+        &[4, 16, 32, 64],
+        0.0,
+        30,
+        Bar::Order(0.05, 0.7),
+    ));
     section.studies.push(sensitive());
     section.studies.push(linked());
     section
@@ -34,11 +62,16 @@ pub fn section() -> Section {
 const SUBSTEPS: [f64; 3] = [32e-3, 16e-3, 8e-3];
 
 fn stepped(h: f64) -> Level {
-    Level::new(format!("{} ms", 1e3 * h), h, &[("solver.substep", format!("{h:e}")), ("frame_rate", format!("{:e}", 1.0 / h))])
+    Level::new(
+        format!("{} ms", 1e3 * h),
+        h,
+        &[("solver.substep", format!("{h:e}")), ("frame_rate", format!("{:e}", 1.0 / h))],
+    )
 }
 
-/// The tip after two seconds. The rod begins in the shape of the continuum's mode, and the clamp turns its first element: a part of 0.005 of the second
-/// mode is in it, which at the shortest substep is more than the first mode loses in two seconds, and is gone by then.
+/// The tip after two seconds. The rod begins in the shape of the continuum's mode, and the clamp turns its first
+/// element: a part of 0.005 of the second mode is in it, which at the shortest substep is more than the first mode
+/// loses in two seconds, and is gone by then.
 fn late(o: &Outcome) -> Vec<(f64, f64)> {
     series(o, "tip").into_iter().filter(|p| p.0 > 2.0).collect()
 }
@@ -53,7 +86,13 @@ fn cantilever() -> Study {
         .set("thread.rod.points", shaped(N, LENGTH, |s| vibration::cantilever_shape(beta, s)))
         .set("phase.swing.duration", "24 s")
         .levels(SUBSTEPS.map(stepped).into())
-        .quantity(Quantity::measured("frequency [Hz]", |o| frequency(&series(o, "tip")), vec![w / TAU], "chain of 20 links", Bar::Order(0.005, 1.8)))
+        .quantity(Quantity::measured(
+            "frequency [Hz]",
+            |o| frequency(&series(o, "tip")),
+            vec![w / TAU],
+            "chain of 20 links",
+            Bar::Order(0.005, 1.8),
+        ))
         .quantity(Quantity::measured(
             "frequency [Hz]",
             |o| frequency(&series(o, "tip")),
@@ -61,7 +100,13 @@ fn cantilever() -> Study {
             "TR-BDF2",
             Bar::Within(0.002),
         ))
-        .quantity(Quantity::measured("decay [1/s]", |o| decay(&late(o)), SUBSTEPS.map(|h| tr_bdf2_decay(w, h)).to_vec(), "TR-BDF2", Bar::Within(0.01)))
+        .quantity(Quantity::measured(
+            "decay [1/s]",
+            |o| decay(&late(o)),
+            SUBSTEPS.map(|h| tr_bdf2_decay(w, h)).to_vec(),
+            "TR-BDF2",
+            Bar::Within(0.01),
+        ))
 }
 
 fn pendulum() -> Study {
@@ -103,7 +148,8 @@ fn tip(o: &Outcome) -> Vec<[f64; 3]> {
 
 /// The converged path of the end, run when it is first asked for.
 fn converged(drag: f64, settings: &[(&str, &str)]) -> Vec<[f64; 3]> {
-    let mut all = vec![damping(drag), ("solver.substeps".into(), "64".into()), ("solver.tolerance".into(), "1e-5".into())];
+    let mut all =
+        vec![damping(drag), ("solver.substeps".into(), "64".into()), ("solver.tolerance".into(), "1e-5".into())];
     all.extend(settings.iter().map(|(path, value)| ((*path).to_string(), (*value).to_string())));
     run::scene("free_swing", &all).map_or_else(|_| Vec::new(), |o| tip(&o))
 }
@@ -113,27 +159,34 @@ fn apart(a: &[[f64; 3]], b: &[[f64; 3]], frames: usize) -> f64 {
     if a.len() <= frames || b.len() <= frames {
         return f64::NAN;
     }
-    let squares: f64 = a.iter().zip(b).skip(1).take(frames).flat_map(|(a, b)| (0..3).map(move |i| (a[i] - b[i]).powi(2))).sum();
+    let squares: f64 =
+        a.iter().zip(b).skip(1).take(frames).flat_map(|(a, b)| (0..3).map(move |i| (a[i] - b[i]).powi(2))).sum();
     (squares / frames as f64).sqrt()
 }
 
 fn swing(name: &str, integrator: &str, substeps: &[u32], drag: f64, frames: usize, bar: Bar) -> Study {
     let reference = OnceLock::new();
     let off = move |o: &Outcome| 1e3 * apart(&tip(o), reference.get_or_init(|| converged(drag, &[])), frames);
-    let levels = substeps.iter().map(|n| Level::new(format!("{n} a frame"), 1.0 / f64::from(*n), &[("solver.substeps", n.to_string())]));
+    let levels = substeps
+        .iter()
+        .map(|n| Level::new(format!("{n} a frame"), 1.0 / f64::from(*n), &[("solver.substeps", n.to_string())]));
     let (path, value) = damping(drag);
     Study::new(name, "free_swing")
         .set("solver.integrator", integrator)
         .set(&path, value)
         .levels(levels.collect())
-        .quantity(Quantity::measured("end, distance from the converged path [mm]", off, vec![0.0], "64 substeps", bar).scale(1000.0 * 0.15))
+        .quantity(
+            Quantity::measured("end, distance from the converged path [mm]", off, vec![0.0], "64 substeps", bar)
+                .scale(1000.0 * 0.15),
+        )
 }
 
 /// Not of ours but of the problem: what a millionth more of weight does without drag.
 fn sensitive() -> Study {
     let moved = |frames: usize| {
         move |_: &Outcome| {
-            let [a, b] = ["-9.81", "-9.81000981"].map(|g| converged(0.0, &[("solver.gravity", &format!("[0, 0, {g}]"))]));
+            let [a, b] =
+                ["-9.81", "-9.81000981"].map(|g| converged(0.0, &[("solver.gravity", &format!("[0, 0, {g}]"))]));
             1e3 * apart(&a, &b, frames)
         }
     };
@@ -159,7 +212,8 @@ fn linked() -> Study {
         };
         1e3 * TIMES.iter().zip(exact).map(at).fold(0.0, |a, b| if b.is_nan() || b > a { b } else { a })
     };
-    let levels = [4_u32, 8, 16].map(|n| Level::new(format!("{n} a frame"), 1.0 / f64::from(n), &[("solver.substeps", n.to_string())]));
+    let levels = [4_u32, 8, 16]
+        .map(|n| Level::new(format!("{n} a frame"), 1.0 / f64::from(n), &[("solver.substeps", n.to_string())]));
     let (path, value) = damping(4.0);
     Study::new("free swing of 40 elements, inextensible, drag 4/s", "free_swing")
         .set("thread.thread.elements", N)
@@ -168,7 +222,13 @@ fn linked() -> Study {
         .set("phase.swing.duration", "0.5 s")
         .levels(levels.into())
         .quantity(
-            Quantity::measured("end, greatest distance at 0.1 to 0.4 s [mm]", off, vec![0.0], "40 links, Runge and Kutta", Bar::Order(5e-4, 1.8))
-                .scale(1000.0 * LENGTH),
+            Quantity::measured(
+                "end, greatest distance at 0.1 to 0.4 s [mm]",
+                off,
+                vec![0.0],
+                "40 links, Runge and Kutta",
+                Bar::Order(5e-4, 1.8),
+            )
+            .scale(1000.0 * LENGTH),
         )
 }

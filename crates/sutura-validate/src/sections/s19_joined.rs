@@ -27,7 +27,10 @@ fn elements(counts: [u32; 3], threads: [(&str, u32); 2]) -> Vec<Level> {
     let total: u32 = threads.iter().map(|(_, part)| part).sum();
     let level = |n: u32| {
         let mut level = Level::new(n.to_string(), 1.0 / f64::from(n), &[]);
-        level.settings = threads.iter().map(|(name, part)| (format!("thread.{name}.elements"), (n * part / total).to_string())).collect();
+        level.settings = threads
+            .iter()
+            .map(|(name, part)| (format!("thread.{name}.elements"), (n * part / total).to_string()))
+            .collect();
         level
     };
     counts.map(level).into()
@@ -49,7 +52,9 @@ fn splice() -> Study {
     }
     .tip()
     .position;
-    let load = |place: &str| format!("{{ load = \"tip\", {place}, force = {}, torque = {}, ramp = \"2 s\" }}", vector(force), vector(torque));
+    let load = |place: &str| {
+        format!("{{ load = \"tip\", {place}, force = {}, torque = {}, ramp = \"2 s\" }}", vector(force), vector(torque))
+    };
     let whole = load("at = \"end\"");
     // The same rod in one piece, run when it is first asked for.
     let pieces: [OnceLock<[f64; 3]>; 3] = Default::default();
@@ -58,7 +63,10 @@ fn splice() -> Study {
         let n: usize = o.report.threads.iter().map(|t| t.elements).sum();
         let Some(i) = COUNTS.iter().position(|c| *c as usize == n) else { return f64::NAN };
         let one = pieces[i].get_or_init(|| {
-            let settings = [("thread.rod.elements".to_string(), n.to_string()), ("phase.load.action[0]".to_string(), whole.clone())];
+            let settings = [
+                ("thread.rod.elements".to_string(), n.to_string()),
+                ("phase.load.action[0]".to_string(), whole.clone()),
+            ];
             run::scene("cantilever", &settings).map_or([f64::NAN; 3], |o| tip(&o))
         });
         tip(o).iter().zip(one).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt() / LENGTH
@@ -67,10 +75,23 @@ fn splice() -> Study {
         .set("phase.load.action[0]", load("thread = \"outer\", at = \"start\""))
         .levels(elements(COUNTS, [("root", 1), ("outer", 1)]))
         .quick(true)
-        .quantity(Quantity::measured("tip, distance from that of the rod in one piece / L", apart, Vec::new(), "the same", Bar::AtMost(1e-5)));
+        .quantity(Quantity::measured(
+            "tip, distance from that of the rod in one piece / L",
+            apart,
+            Vec::new(),
+            "the same",
+            Bar::AtMost(1e-5),
+        ));
     for (i, probe) in ["tip.x", "tip.y", "tip.z"].into_iter().enumerate() {
         let name = format!("{} / L", probe.replace('.', " "));
-        study = study.quantity(Quantity::last(name, probe, 1.0 / LENGTH, exact[i] / LENGTH, "shooting", Bar::Order(0.01, 1.8)));
+        study = study.quantity(Quantity::last(
+            name,
+            probe,
+            1.0 / LENGTH,
+            exact[i] / LENGTH,
+            "shooting",
+            Bar::Order(0.01, 1.8),
+        ));
     }
     study.quantity(Quantity::measured(
         "pieces part by at most [m]",
@@ -91,7 +112,8 @@ fn knee(name: &str, direction: [f64; 3]) -> Study {
         .set("phase.load.action[0].force", vector(direction.map(|c| FORCE * c)))
         .levels(elements([25, 50, 100], [("leg", 3), ("arm", 2)]))
         .quick(true);
-    let angle = |o: &Outcome| series(o, "angle").iter().map(|p| (p.1 - std::f64::consts::FRAC_PI_2).abs()).fold(0.0, f64::max);
+    let angle =
+        |o: &Outcome| series(o, "angle").iter().map(|p| (p.1 - std::f64::consts::FRAC_PI_2).abs()).fold(0.0, f64::max);
     let beam = "beam theory";
     let study = if direction[2] == 0.0 {
         let moved = move |probe: &'static str, at: f64| move |o: &Outcome| (last(o, probe) - at) / FORCE;
@@ -103,14 +125,48 @@ fn knee(name: &str, direction: [f64; 3]) -> Study {
                 beam,
                 Bar::Order(0.005, 1.8),
             ))
-            .quantity(Quantity::measured("across it [m/N]", moved("tip.y", arm), vec![-arm * leg * leg / (2.0 * ei)], beam, Bar::Order(0.005, 1.8)))
-            .quantity(Quantity::last("torque of the clamp over F b", "wall_torque.z", 1.0 / (FORCE * arm), 1.0, "statics", Bar::Within(1e-3)))
+            .quantity(Quantity::measured(
+                "across it [m/N]",
+                moved("tip.y", arm),
+                vec![-arm * leg * leg / (2.0 * ei)],
+                beam,
+                Bar::Order(0.005, 1.8),
+            ))
+            .quantity(Quantity::last(
+                "torque of the clamp over F b",
+                "wall_torque.z",
+                1.0 / (FORCE * arm),
+                1.0,
+                "statics",
+                Bar::Within(1e-3),
+            ))
     } else {
         let sag = -(bent(leg) + bent(arm) + arm * arm * leg / gj);
         study
-            .quantity(Quantity::last("tip moves [m/N]", "tip.z", 1.0 / FORCE, sag, "beam theory", Bar::Order(0.005, 1.8)))
-            .quantity(Quantity::last("torque of the clamp over F b", "wall_torque.x", 1.0 / (FORCE * arm), 1.0, "statics", Bar::Within(1e-3)))
-            .quantity(Quantity::last("over F a", "wall_torque.y", -1.0 / (FORCE * leg), 1.0, "statics", Bar::Within(1e-3)))
+            .quantity(Quantity::last(
+                "tip moves [m/N]",
+                "tip.z",
+                1.0 / FORCE,
+                sag,
+                "beam theory",
+                Bar::Order(0.005, 1.8),
+            ))
+            .quantity(Quantity::last(
+                "torque of the clamp over F b",
+                "wall_torque.x",
+                1.0 / (FORCE * arm),
+                1.0,
+                "statics",
+                Bar::Within(1e-3),
+            ))
+            .quantity(Quantity::last(
+                "over F a",
+                "wall_torque.y",
+                -1.0 / (FORCE * leg),
+                1.0,
+                "statics",
+                Bar::Within(1e-3),
+            ))
     };
     // Read between elements half an element from the weld.
     study.quantity(Quantity::measured("change of the angle [rad]", angle, Vec::new(), "keeps", Bar::AtMost(1e-3)))
@@ -127,8 +183,22 @@ fn branch() -> Study {
         .levels(elements([30, 60, 120], [("bar", 2), ("arm", 1)]))
         .quick(true)
         .quantity(Quantity::last("tip moves [m/N]", "tip.z", -1.0 / FORCE, sag, "beam theory", Bar::Order(0.01, 1.8)))
-        .quantity(Quantity::last("torque of a clamp over F b / 2", "torque", 2.0 / (FORCE * arm), 1.0, "statics", Bar::Within(1e-3)))
-        .quantity(Quantity::last("force of the clamps over the load", "carried", 1.0 / FORCE, 1.0, "statics", Bar::Within(1e-6)))
+        .quantity(Quantity::last(
+            "torque of a clamp over F b / 2",
+            "torque",
+            2.0 / (FORCE * arm),
+            1.0,
+            "statics",
+            Bar::Within(1e-3),
+        ))
+        .quantity(Quantity::last(
+            "force of the clamps over the load",
+            "carried",
+            1.0 / FORCE,
+            1.0,
+            "statics",
+            Bar::Within(1e-6),
+        ))
         .quantity(Quantity::measured(
             "tip moves across / down",
             |o| columns(o, "tip", ["x", "z"]).last().map_or(f64::NAN, |[x, z]| ((x - 0.02) / z).abs()),

@@ -33,8 +33,20 @@ fn hanging() -> Study {
     Study::new("hanging thread, let down and drawn up", "reel_hanging")
         .substeps(&[8e-3, 4e-3, 2e-3])
         .quick(true)
-        .quantity(Quantity::measured("length when let down [mm]", |o| 1e3 * before(o, "length", 6.0), vec![1e3 * down], "rate times time", Bar::Within(1e-4)))
-        .quantity(Quantity::measured("end below the mouth [mm]", |o| 1e3 * before(o, "low", 6.0), vec![1e3 * down], "hangs straight", Bar::Within(1e-4)))
+        .quantity(Quantity::measured(
+            "length when let down [mm]",
+            |o| 1e3 * before(o, "length", 6.0),
+            vec![1e3 * down],
+            "rate times time",
+            Bar::Within(1e-4),
+        ))
+        .quantity(Quantity::measured(
+            "end below the mouth [mm]",
+            |o| 1e3 * before(o, "low", 6.0),
+            vec![1e3 * down],
+            "hangs straight",
+            Bar::Within(1e-4),
+        ))
         .quantity(Quantity::measured(
             "force at the mouth over the weight",
             move |o| before(o, "force", 6.0) / weight(down),
@@ -42,13 +54,28 @@ fn hanging() -> Study {
             theory,
             Bar::Within(1e-3),
         ))
-        .quantity(Quantity::last("length when drawn up [mm]", "length", 1e3, 1e3 * up, "rate times time", Bar::Within(1e-4)))
-        .quantity(Quantity::last("force at the mouth over the weight, drawn up", "force", 1.0 / weight(up), 1.0, theory, Bar::Within(1e-3)))
+        .quantity(Quantity::last(
+            "length when drawn up [mm]",
+            "length",
+            1e3,
+            1e3 * up,
+            "rate times time",
+            Bar::Within(1e-4),
+        ))
+        .quantity(Quantity::last(
+            "force at the mouth over the weight, drawn up",
+            "force",
+            1.0 / weight(up),
+            1.0,
+            theory,
+            Bar::Within(1e-3),
+        ))
 }
 
 fn brake() -> Study {
     const SET: f64 = 0.2;
-    let level = |pull: f64| Level::new(format!("{pull} N"), 0.0, &[("phase.come off.action[0].force", format!("{pull}"))]);
+    let level =
+        |pull: f64| Level::new(format!("{pull} N"), 0.0, &[("phase.come off.action[0].force", format!("{pull}"))]);
     let pulls = [0.22, 0.3, 0.8];
     let speed = pulls.map(|pull| 50.0 * (1.0 - SET / pull)).to_vec();
     // From a second after the pull grew.
@@ -64,7 +91,10 @@ fn brake() -> Study {
             Bar::AtMost(1e-3),
         ))
         .quantity(Quantity::last("force at the mouth [N]", "force", 1.0, SET, "brake", Bar::Within(1e-3)))
-        .quantity(Quantity::last("speed of the grip [mm/s]", "speed", 1e3, 0.0, "v_limit (1 - T / F)", Bar::Within(1e-3)).references(speed.clone()))
+        .quantity(
+            Quantity::last("speed of the grip [mm/s]", "speed", 1e3, 0.0, "v_limit (1 - T / F)", Bar::Within(1e-3))
+                .references(speed.clone()),
+        )
         .quantity(Quantity::measured("thread given off [mm/s]", per_second, speed, "the same", Bar::Within(2e-3)))
 }
 
@@ -76,9 +106,25 @@ fn capstan() -> Study {
     // As in section 9.
     let exact = (0.2 * PI).exp();
     Study::new("drawn over a cylinder, 180 degrees, mu = 0.2", "capstan_reel")
-        .levels([130, 180].map(|n: u32| Level::new(n.to_string(), 0.0, &[("thread.thread.elements", n.to_string())])).into())
-        .quantity(Quantity::measured("force at the mouth [N]", move |o| mean(o, "hold"), vec![0.1], "brake", Bar::Within(1e-3)))
-        .quantity(Quantity::measured("T2 / T1", move |o| mean(o, "pull") / mean(o, "hold"), vec![exact], "capstan", Bar::Within(0.005)))
+        .levels(
+            [130, 180]
+                .map(|n: u32| Level::new(n.to_string(), 0.0, &[("thread.thread.elements", n.to_string())]))
+                .into(),
+        )
+        .quantity(Quantity::measured(
+            "force at the mouth [N]",
+            move |o| mean(o, "hold"),
+            vec![0.1],
+            "brake",
+            Bar::Within(1e-3),
+        ))
+        .quantity(Quantity::measured(
+            "T2 / T1",
+            move |o| mean(o, "pull") / mean(o, "hold"),
+            vec![exact],
+            "capstan",
+            Bar::Within(0.005),
+        ))
         .quantity(Quantity::measured(
             "given off in the last second [mm]",
             |o| 1e3 * (last(o, "length") - before(o, "length", 1.0)),
@@ -86,7 +132,13 @@ fn capstan() -> Study {
             "drawn",
             Bar::Within(0.005),
         ))
-        .quantity(Quantity::measured("stretch at the mouth", |o| last(o, "hold") / T2.ea(), vec![0.1 / T2.ea()], "T / EA", Bar::Within(1e-3)))
+        .quantity(Quantity::measured(
+            "stretch at the mouth",
+            |o| last(o, "hold") / T2.ea(),
+            vec![0.1 / T2.ea()],
+            "T / EA",
+            Bar::Within(1e-3),
+        ))
 }
 
 fn fed() -> Study {

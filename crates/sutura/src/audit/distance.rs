@@ -1,21 +1,24 @@
-//! Distances of segments from solids, and whether a moving distance ever gets small. Written for the audit alone: it must not share a
-//! mistake with the contact code.
+//! Distances of segments from solids, and whether a moving distance ever gets small. Written for the audit alone: it
+//! must not share a mistake with the contact code.
 //!
-//! A sweep needs no polynomial roots. While the ends of two segments move along straight lines, their distance changes no faster
-//! than the fastest pair of ends; so a distance `d` at one instant keeps it above zero for a time `d / rate` on both sides. Halving
-//! what is not yet excluded ends at the crossing or at nothing, and moves within one plane or end to end are no special cases.
+//! A sweep needs no polynomial roots. While the ends of two segments move along straight lines, their distance changes
+//! no faster than the fastest pair of ends; so a distance `d` at one instant keeps it above zero for a time `d / rate`
+//! on both sides. Halving what is not yet excluded ends at the crossing or at nothing, and moves within one plane or
+//! end to end are no special cases.
 
 use crate::Geometry;
 use crate::knot::space::{point_segment, segments};
 use glam::DVec3;
 
-/// Least signed distance of a segment from the surface of a convex solid, negative inside, in the solid's own frame. Infinite for
-/// the mesh, which is no solid.
+/// Least signed distance of a segment from the surface of a convex solid, negative inside, in the solid's own frame.
+/// Infinite for the mesh, which is no solid.
 pub(super) fn segment_solid(p: [DVec3; 2], solid: &Geometry) -> f64 {
     match solid {
         Geometry::Plane => p[0].z.min(p[1].z),
         Geometry::Sphere { radius } => point_segment(DVec3::ZERO, p) - radius,
-        Geometry::Capsule { radius, half_length } => segments(p, [DVec3::Z * -*half_length, DVec3::Z * *half_length]) - radius,
+        Geometry::Capsule { radius, half_length } => {
+            segments(p, [DVec3::Z * -*half_length, DVec3::Z * *half_length]) - radius
+        }
         Geometry::Cylinder { radius, half_length } => {
             // Beside the cylinder only the distance from the axis counts: the common case, and a quick one.
             let across = p.map(|x| DVec3::new(x.x, x.y, 0.0));
@@ -59,18 +62,26 @@ fn least_along([a, b]: [DVec3; 2], distance: impl Fn(DVec3) -> f64) -> f64 {
     at_s.min(at_t).min(at(0.0)).min(at(1.0))
 }
 
-/// How often one motion is looked at. What slides past at the distance `d` over the length `l` needs about `l / d` looks, so this is
-/// a slide of thousands of thread diameters in one substep.
+/// How often one motion is looked at. What slides past at the distance `d` over the length `l` needs about `l / d`
+/// looks, so this is a slide of thousands of thread diameters in one substep.
 const MOST_LOOKS: u32 = 1 << 14;
 
-/// First time in [0, 1] found at which `distance` is at most `limit`, or so near to it that `resolution` or [`MOST_LOOKS`] cannot tell, when
-/// it changes by at most `rate` in the whole interval. Never misses one.
+/// First time in [0, 1] found at which `distance` is at most `limit`, or so near to it that `resolution` or
+/// [`MOST_LOOKS`] cannot tell, when it changes by at most `rate` in the whole interval. Never misses one.
 pub(super) fn time_within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64) -> Option<f64> {
     let mut looks = MOST_LOOKS;
     within(distance, rate, limit, resolution, (0.0, distance(0.0)), (1.0, distance(1.0)), &mut looks)
 }
 
-fn within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64, from: (f64, f64), to: (f64, f64), looks: &mut u32) -> Option<f64> {
+fn within(
+    distance: &impl Fn(f64) -> f64,
+    rate: f64,
+    limit: f64,
+    resolution: f64,
+    from: (f64, f64),
+    to: (f64, f64),
+    looks: &mut u32,
+) -> Option<f64> {
     let span = rate * (to.0 - from.0);
     if from.1 <= limit {
         return Some(from.0);
@@ -85,7 +96,8 @@ fn within(distance: &impl Fn(f64) -> f64, rate: f64, limit: f64, resolution: f64
     }
     *looks -= 1;
     let middle = (middle, distance(middle));
-    within(distance, rate, limit, resolution, from, middle, looks).or_else(|| within(distance, rate, limit, resolution, middle, to, looks))
+    within(distance, rate, limit, resolution, from, middle, looks)
+        .or_else(|| within(distance, rate, limit, resolution, middle, to, looks))
 }
 
 #[cfg(test)]
@@ -111,8 +123,8 @@ mod tests {
             }
         }
 
-        /// Against the coplanarity cubic, solved by sampling: where its sign changes between two fine times and the segments are near,
-        /// there is a crossing, and it must be found.
+        /// Against the coplanarity cubic, solved by sampling: where its sign changes between two fine times and the
+        /// segments are near, there is a crossing, and it must be found.
         #[test]
         fn no_crossing_is_missed(p in [point(), point()], q in [point(), point()], dp in [point(), point()], dq in [point(), point()]) {
             let at = |x: [DVec3; 2], v: [DVec3; 2], t: f64| [x[0] + v[0] * t, x[1] + v[1] * t];
@@ -131,8 +143,8 @@ mod tests {
                         let m = 0.5 * (a + b);
                         if volume(a) * volume(m) <= 0.0 { b = m } else { a = m }
                     }
-                    // Points are of order one: after 60 bisections what is left of a true crossing is rounding; the segments' lines may cross
-                    // outside of them, far more than this apart.
+                    // Points are of order one: after 60 bisections what is left of a true crossing is rounding; the
+                    // segments' lines may cross outside of them, far more than this apart.
                     if distance(a) < 1e-12 {
                         prop_assert!(found.is_some(), "crossing at {a} missed");
                     }
@@ -159,11 +171,13 @@ mod tests {
 
     #[test]
     fn a_move_in_the_common_plane_is_found() {
-        // Collinear segments that run into each other, and a segment that slides over another in their plane: the cubic is zero.
+        // Collinear segments that run into each other, and a segment that slides over another in their plane: the cubic
+        // is zero.
         let still = [DVec3::ZERO, DVec3::X];
         let end_on = |t: f64| segments([DVec3::X * (3.0 - 3.0 * t), DVec3::X * (4.0 - 3.0 * t)], still);
         assert!(time_within(&end_on, 3.0, 1e-6, 1e-6).is_some());
-        let across = |t: f64| segments([DVec3::new(0.5, 2.0 - 4.0 * t, 0.0), DVec3::new(0.6, 2.5 - 4.0 * t, 0.0)], still);
+        let across =
+            |t: f64| segments([DVec3::new(0.5, 2.0 - 4.0 * t, 0.0), DVec3::new(0.6, 2.5 - 4.0 * t, 0.0)], still);
         assert!(time_within(&across, 4.0, 1e-6, 1e-6).is_some());
         let past = |t: f64| segments([DVec3::new(1.1, 2.0 - 4.0 * t, 0.0), DVec3::new(1.2, 2.5 - 4.0 * t, 0.0)], still);
         assert!(time_within(&past, 4.0, 1e-6, 1e-6).is_none());

@@ -21,9 +21,19 @@ impl Scene {
         self
     }
     fn show(&self, audit: &mut Audit, time: f64) {
-        let rods = self.rods.iter().map(|(slot, radius, x, rest)| RodSlice { slot: *slot, radius: *radius, positions: x, rest_lengths: rest });
-        let shapes =
-            self.shapes.iter().map(|(slot, geometry, pose)| ShapeView { slot: *slot, geometry, pose: *pose, motion: crate::ShapeMotion::Fixed, surface: 0 });
+        let rods = self.rods.iter().map(|(slot, radius, x, rest)| RodSlice {
+            slot: *slot,
+            radius: *radius,
+            positions: x,
+            rest_lengths: rest,
+        });
+        let shapes = self.shapes.iter().map(|(slot, geometry, pose)| ShapeView {
+            slot: *slot,
+            geometry,
+            pose: *pose,
+            motion: crate::ShapeMotion::Fixed,
+            surface: 0,
+        });
         audit.observe_slices(time, rods, shapes, core::iter::empty());
     }
 }
@@ -44,7 +54,9 @@ fn across(height: f64) -> Vec<DVec3> {
 #[test]
 fn a_thread_drawn_through_another_in_one_state_is_found_and_a_touch_is_not() {
     let still = line(DVec3::X * -5e-3, DVec3::X * 5e-3, 33);
-    let show = |audit: &mut Audit, time, height| Scene::default().with_rod(3, R, still.clone()).with_rod(5, R, across(height)).show(audit, time);
+    let show = |audit: &mut Audit, time, height| {
+        Scene::default().with_rod(3, R, still.clone()).with_rod(5, R, across(height)).show(audit, time)
+    };
     let mut audit = Audit::new();
     show(&mut audit, 0.0, 3.0 * R);
     show(&mut audit, 0.1, 2.0 * R); // Touches.
@@ -55,31 +67,41 @@ fn a_thread_drawn_through_another_in_one_state_is_found_and_a_touch_is_not() {
     show(&mut audit, 0.3, -4.0 * R);
     let report = audit.report();
     assert!(report.passes_through);
-    assert!(report.crossings.iter().all(|c| c.time == 0.3 && matches!(c.what, Pair::Threads { a: (3, 16), b: (5, 12) })), "{:?}", report.crossings);
+    assert!(
+        report.crossings.iter().all(|c| c.time == 0.3 && matches!(c.what, Pair::Threads { a: (3, 16), b: (5, 12) })),
+        "{:?}",
+        report.crossings
+    );
     assert_eq!((report.states, report.crossings.len()), (4, 1));
 }
 
 #[test]
 fn elements_next_to_each_other_are_left_out_and_a_fold_is_not() {
     // A hairpin of radius r in elements of r / 2: everything within pi r of thread is its own bend.
-    let bend: Vec<DVec3> = (0..=6).map(|k| libm::sincos(core::f64::consts::PI * f64::from(k) / 6.0)).map(|(s, c)| DVec3::new(s * R, c * R, 0.0)).collect();
+    let bend: Vec<DVec3> = (0..=6)
+        .map(|k| libm::sincos(core::f64::consts::PI * f64::from(k) / 6.0))
+        .map(|(s, c)| DVec3::new(s * R, c * R, 0.0))
+        .collect();
     let mut hairpin = line(DVec3::new(-20.0 * R, R, 0.0), bend[0], 40);
     hairpin.extend(&bend[1..]);
     hairpin.extend(&line(bend[6], DVec3::new(-20.0 * R, -R, 0.0), 40)[1..]);
     let mut audit = Audit::new();
     Scene::default().with_rod(0, R, hairpin.clone()).show(&mut audit, 0.0);
-    // The legs touch side by side. A chord of the polygon bend is shorter than the arc's, by less than the sagitta of its pieces.
+    // The legs touch side by side. A chord of the polygon bend is shorter than the arc's, by less than the sagitta of
+    // its pieces.
     let touch = audit.report().thread_clearance.unwrap();
     assert!(touch.abs() < 0.04, "{touch}");
     // The legs change sides.
-    let crossed: Vec<DVec3> = hairpin.iter().map(|p| if p.x < -5.0 * R { DVec3::new(p.x, -p.y, p.z) } else { *p }).collect();
+    let crossed: Vec<DVec3> =
+        hairpin.iter().map(|p| if p.x < -5.0 * R { DVec3::new(p.x, -p.y, p.z) } else { *p }).collect();
     Scene::default().with_rod(0, R, crossed).show(&mut audit, 0.1);
     assert!(audit.report().passes_through);
 }
 
 #[test]
 fn a_whip_crack_without_contact_is_no_passage() {
-    // Two threads fly by each other far and fast, one behind the other: boxes of the sweeps overlap, the threads never do.
+    // Two threads fly by each other far and fast, one behind the other: boxes of the sweeps overlap, the threads never
+    // do.
     let show = |audit: &mut Audit, time: f64| {
         let along = DVec3::new(0.7, 0.7, 0.0) * time;
         let a = shifted(&across(0.0), along);
@@ -116,8 +138,22 @@ fn solids() -> Vec<(Geometry, f64)> {
 
 /// A thin closed box as a mesh.
 fn slab() -> Geometry {
-    let vertices = (0..8).map(|k| DVec3::new(sign(k & 1) * 2e-3, sign(k >> 1 & 1) * 2e-3, sign(k >> 2) * 2e-4)).collect();
-    let triangles = vec![[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]];
+    let vertices =
+        (0..8).map(|k| DVec3::new(sign(k & 1) * 2e-3, sign(k >> 1 & 1) * 2e-3, sign(k >> 2) * 2e-4)).collect();
+    let triangles = vec![
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ];
     Geometry::Mesh { vertices, triangles }
 }
 
@@ -131,7 +167,9 @@ fn a_thread_laid_on_a_shape_touches_it_and_drawn_through_is_found() {
     for (geometry, top) in solids() {
         let over = |height: f64| line(DVec3::new(0.0, -5e-3, top + height), DVec3::new(0.0, 5e-3, top + height), 25);
         let thread = |height: f64| over(height).into_iter().map(|p| pose.transform_point(p)).collect::<Vec<_>>();
-        let show = |audit: &mut Audit, time, height| Scene::default().with_rod(0, R, thread(height)).with_shape(7, geometry.clone(), pose).show(audit, time);
+        let show = |audit: &mut Audit, time, height| {
+            Scene::default().with_rod(0, R, thread(height)).with_shape(7, geometry.clone(), pose).show(audit, time)
+        };
         let mut audit = Audit::new();
         show(&mut audit, 0.0, 8.0 * R);
         assert_eq!(audit.report().shape_clearance, None, "{geometry:?}");
@@ -171,7 +209,10 @@ fn a_turning_blade_sweeps_a_thread() {
     let blade = Geometry::Box { half_sides: DVec3::new(5e-3, 1e-4, 1e-3) };
     let thread = line(DVec3::new(3e-3, 3e-3, -2e-3), DVec3::new(3e-3, 3e-3, 2e-3), 20);
     let show = |audit: &mut Audit, time, angle: f64| {
-        Scene::default().with_rod(0, R, thread.clone()).with_shape(0, blade.clone(), Pose::new(DVec3::ZERO, DQuat::from_rotation_z(angle))).show(audit, time);
+        Scene::default()
+            .with_rod(0, R, thread.clone())
+            .with_shape(0, blade.clone(), Pose::new(DVec3::ZERO, DQuat::from_rotation_z(angle)))
+            .show(audit, time);
     };
     let mut audit = Audit::new();
     show(&mut audit, 0.0, 0.0);
@@ -192,7 +233,10 @@ fn threads_and_shapes_that_come_and_go_are_taken_up_anew() {
     // It goes, and the first moves on where it was; a plane appears above.
     let roof = Pose::new(DVec3::Z, DQuat::from_rotation_x(core::f64::consts::PI));
     Scene::default().with_rod(0, R, still.clone()).with_shape(0, Geometry::Plane, roof).show(&mut audit, 0.2);
-    Scene::default().with_rod(0, R, shifted(&still, DVec3::Z * -1e-3)).with_shape(0, Geometry::Sphere { radius: 1e-4 }, Pose::IDENTITY).show(&mut audit, 0.3);
+    Scene::default()
+        .with_rod(0, R, shifted(&still, DVec3::Z * -1e-3))
+        .with_shape(0, Geometry::Sphere { radius: 1e-4 }, Pose::IDENTITY)
+        .show(&mut audit, 0.3);
     assert!(!audit.report().passes_through, "{:?}", audit.report().crossings);
     assert_eq!(audit.report().states, 4);
 }
@@ -200,7 +244,9 @@ fn threads_and_shapes_that_come_and_go_are_taken_up_anew() {
 #[test]
 fn a_state_that_is_not_finite_is_counted_and_skipped() {
     let still = line(DVec3::X * -5e-3, DVec3::X * 5e-3, 33);
-    let show = |audit: &mut Audit, time, height| Scene::default().with_rod(0, R, still.clone()).with_rod(1, R, across(height)).show(audit, time);
+    let show = |audit: &mut Audit, time, height| {
+        Scene::default().with_rod(0, R, still.clone()).with_rod(1, R, across(height)).show(audit, time)
+    };
     let mut audit = Audit::new();
     show(&mut audit, 0.0, 4.0 * R);
     show(&mut audit, 0.1, f64::NAN);
@@ -213,7 +259,11 @@ fn a_state_that_is_not_finite_is_counted_and_skipped() {
 #[test]
 fn elongation_is_the_largest_seen_of_each_thread() {
     let mut audit = Audit::new();
-    let mut scene = Scene::default().with_rod(2, R, line(DVec3::ZERO, DVec3::X, 10)).with_rod(4, R, line(DVec3::Y, DVec3::Y + DVec3::X, 10));
+    let mut scene = Scene::default().with_rod(2, R, line(DVec3::ZERO, DVec3::X, 10)).with_rod(
+        4,
+        R,
+        line(DVec3::Y, DVec3::Y + DVec3::X, 10),
+    );
     scene.show(&mut audit, 0.0);
     scene.rods[1].2[10].x += 0.01; // The last element of 0.1.
     scene.show(&mut audit, 0.1);
@@ -264,7 +314,10 @@ fn the_least_clearance_is_that_of_all_pairs() {
 fn passes(geometry: &Geometry, from: (&Pose, &[DVec3]), to: (&Pose, &[DVec3])) -> bool {
     let mut audit = Audit::new();
     for (time, (pose, x)) in [from, to].into_iter().enumerate() {
-        Scene::default().with_rod(0, R, x.to_vec()).with_shape(0, geometry.clone(), *pose).show(&mut audit, time as f64);
+        Scene::default()
+            .with_rod(0, R, x.to_vec())
+            .with_shape(0, geometry.clone(), *pose)
+            .show(&mut audit, time as f64);
         assert!(time > 0 || !audit.report().passes_through, "{geometry:?}");
     }
     audit.report().passes_through
@@ -278,16 +331,21 @@ fn moves_through(geometry: &Geometry, from: &[DVec3], to: &[DVec3]) -> bool {
 /// A profile (radius, height) turned about z: a tube or a ring with all of its wall.
 fn turned(profile: &[(f64, f64)]) -> Geometry {
     let (n, m) = (16, profile.len() as u32);
-    let at = |i: u32, (r, z): (f64, f64)| DQuat::from_rotation_z(core::f64::consts::TAU * f64::from(i) / f64::from(n)) * DVec3::new(r, 0.0, z);
+    let at = |i: u32, (r, z): (f64, f64)| {
+        DQuat::from_rotation_z(core::f64::consts::TAU * f64::from(i) / f64::from(n)) * DVec3::new(r, 0.0, z)
+    };
     let vertices = (0..n).flat_map(|i| profile.iter().map(move |p| at(i, *p))).collect();
     let number = |i: u32, k: u32| (i % n) * m + k % m;
-    let quad = |i: u32, k: u32| [[number(i, k), number(i + 1, k), number(i + 1, k + 1)], [number(i, k), number(i + 1, k + 1), number(i, k + 1)]];
+    let quad = |i: u32, k: u32| {
+        [[number(i, k), number(i + 1, k), number(i + 1, k + 1)], [number(i, k), number(i + 1, k + 1), number(i, k + 1)]]
+    };
     Geometry::Mesh { vertices, triangles: (0..n).flat_map(|i| (0..m).flat_map(move |k| quad(i, k))).collect() }
 }
 
 #[test]
 fn what_is_thinner_than_a_step_is_not_missed() {
-    // Elements of ten diameters, a plate of half a radius, a wire between two particles, and the way of one state a hundred times that.
+    // Elements of ten diameters, a plate of half a radius, a wire between two particles, and the way of one state a
+    // hundred times that.
     let thread = line(DVec3::new(0.3e-3, -5e-3, 0.0), DVec3::new(0.3e-3, 5e-3, 0.0), 5);
     let plate = Geometry::Box { half_sides: DVec3::new(5e-3, 5e-3, 0.25 * R) };
     let wire = Geometry::Cylinder { radius: 0.5 * R, half_length: 5e-3 };
@@ -295,12 +353,25 @@ fn what_is_thinner_than_a_step_is_not_missed() {
     let lying = DQuat::from_rotation_y(core::f64::consts::FRAC_PI_2);
     for (geometry, orientation) in [(plate, DQuat::IDENTITY), (wire, lying), (needle, lying)] {
         let at = |y: f64, z: f64| Pose::new(DVec3::new(0.0, y, z), orientation);
-        for (y, from, to, through) in [(0.9e-3, -5e-3, 5e-3, true), (0.1e-3, 5e-3, -3e-3, true), (0.9e-3, -5e-3, -R, false), (0.2e-3, 5e-3, 0.8 * R, false)] {
-            assert_eq!(passes(&geometry, (&at(y, from), &thread), (&at(y, to), &thread)), through, "{geometry:?} {from} {to}");
+        for (y, from, to, through) in [
+            (0.9e-3, -5e-3, 5e-3, true),
+            (0.1e-3, 5e-3, -3e-3, true),
+            (0.9e-3, -5e-3, -R, false),
+            (0.2e-3, 5e-3, 0.8 * R, false),
+        ] {
+            assert_eq!(
+                passes(&geometry, (&at(y, from), &thread), (&at(y, to), &thread)),
+                through,
+                "{geometry:?} {from} {to}"
+            );
             // Both move, as fast as the shape alone did and across that.
             let carried = shifted(&thread, DVec3::new(4e-3, 0.0, 0.0));
             let moved = Pose::new(DVec3::new(4e-3, y, to), orientation);
-            assert_eq!(passes(&geometry, (&at(y, from), &thread), (&moved, &carried)), through, "{geometry:?} {from} {to}");
+            assert_eq!(
+                passes(&geometry, (&at(y, from), &thread), (&moved, &carried)),
+                through,
+                "{geometry:?} {from} {to}"
+            );
         }
         // Taken along 30 mm in a state.
         let far = DVec3::new(0.0, 0.0, 0.03);
@@ -322,7 +393,10 @@ fn in_a_tube_a_thread_may_go_anywhere_but_through_the_wall() {
     assert!(moves_through(&tube, &within, &shifted(&within, side * 7.0 * R)), "out through the wall");
     assert!(moves_through(&tube, &within, &shifted(&within, side * 4.4 * R)), "into the wall");
     let beside = shifted(&within, side * 7.0 * R);
-    assert!(!moves_through(&tube, &beside, &shifted(&beside, side * -(2.0 * R - 0.3 * R))), "pressed deep from outside");
+    assert!(
+        !moves_through(&tube, &beside, &shifted(&beside, side * -(2.0 * R - 0.3 * R))),
+        "pressed deep from outside"
+    );
     assert!(moves_through(&tube, &beside, &within), "in through the wall");
     // The tube is drawn off a thread at rest, or dragged across it.
     assert!(!passes(&tube, (&Pose::IDENTITY, &within), (&Pose::at(DVec3::Z * 8e-3), &within)));
@@ -331,8 +405,10 @@ fn in_a_tube_a_thread_may_go_anywhere_but_through_the_wall() {
 
 #[test]
 fn through_a_ring_is_no_passage_and_across_it_is() {
-    let profile: Vec<(f64, f64)> =
-        (0..8).map(|k| libm::sincos(core::f64::consts::TAU * f64::from(k) / 8.0)).map(|(s, c)| (8.0 * R + 2.0 * R * c, 2.0 * R * s)).collect();
+    let profile: Vec<(f64, f64)> = (0..8)
+        .map(|k| libm::sincos(core::f64::consts::TAU * f64::from(k) / 8.0))
+        .map(|(s, c)| (8.0 * R + 2.0 * R * c, 2.0 * R * s))
+        .collect();
     let ring = turned(&profile);
     let through = line(DVec3::new(R, 0.0, -3e-3), DVec3::new(0.0, R, 3e-3), 9);
     assert!(!moves_through(&ring, &through, &shifted(&through, DVec3::Z * 5e-3)));
@@ -346,12 +422,19 @@ fn through_a_ring_is_no_passage_and_across_it_is() {
 
 #[test]
 fn around_the_boundary_of_a_sheet_is_no_passage_and_through_it_is() {
-    let vertices = vec![DVec3::new(-2e-3, -2e-3, 0.0), DVec3::new(2e-3, -2e-3, 0.0), DVec3::new(2e-3, 2e-3, 0.0), DVec3::new(-2e-3, 2e-3, 0.0)];
+    let vertices = vec![
+        DVec3::new(-2e-3, -2e-3, 0.0),
+        DVec3::new(2e-3, -2e-3, 0.0),
+        DVec3::new(2e-3, 2e-3, 0.0),
+        DVec3::new(-2e-3, 2e-3, 0.0),
+    ];
     let sheet = Geometry::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] };
     let above = line(DVec3::new(-1e-3, -3e-3, 5.0 * R), DVec3::new(1e-3, 3e-3, 5.0 * R), 11);
     let (beside, below) = (shifted(&above, DVec3::X * 6e-3), shifted(&above, DVec3::Z * -10.0 * R));
     assert!(moves_through(&sheet, &above, &below));
-    assert!(!moves_through(&sheet, &above, &beside) && !moves_through(&sheet, &beside, &shifted(&below, DVec3::X * 6e-3)));
+    assert!(
+        !moves_through(&sheet, &above, &beside) && !moves_through(&sheet, &beside, &shifted(&below, DVec3::X * 6e-3))
+    );
     assert!(!moves_through(&sheet, &shifted(&below, DVec3::X * 6e-3), &below));
     assert!(!moves_through(&sheet, &above, &shifted(&above, DVec3::Z * -4.7 * R)), "pressed deep");
     // Along its diagonal, where two triangles meet.
@@ -373,7 +456,8 @@ fn in_a_container_and_between_two_walls_of_one_mesh() {
 
 #[test]
 fn what_turns_beside_a_thread_or_takes_it_along_is_no_passage() {
-    // A thread at rest touches a shaft that turns by half a radian between two states: as seen from the shaft the chord of its way is 0.3 mm inside.
+    // A thread at rest touches a shaft that turns by half a radian between two states: as seen from the shaft the chord
+    // of its way is 0.3 mm inside.
     let shaft = Geometry::Cylinder { radius: 1e-2, half_length: 1e-2 };
     let thread = line(DVec3::new(1e-2 + R, -2e-3, 0.0), DVec3::new(1e-2 + R, 2e-3, 0.0), 9);
     let turn = |angle: f64| Pose::new(DVec3::ZERO, DQuat::from_rotation_z(angle));
@@ -394,8 +478,9 @@ fn what_turns_beside_a_thread_or_takes_it_along_is_no_passage() {
     assert!(passes(&blade, (&turn(0.0), &carried(0.0)), (&turn(0.5), &carried(0.0))));
 }
 
-/// Any solid or mesh that moves, turns by up to half a radian and meets a thread that moves: what the audit says is what a look at two thousand
-/// instants says, but where the way as seen from the shape or the world tells, or one of them comes nearer than that look can tell.
+/// Any solid or mesh that moves, turns by up to half a radian and meets a thread that moves: what the audit says is
+/// what a look at two thousand instants says, but where the way as seen from the shape or the world tells, or one of
+/// them comes nearer than that look can tell.
 #[test]
 fn moved_shapes_are_seen_as_by_a_look_at_every_instant() {
     let mut state = 1_u64;
@@ -408,7 +493,8 @@ fn moved_shapes_are_seen_as_by_a_look_at_every_instant() {
     for number in 0..600 {
         let geometry = solids().swap_remove(1 + number % 5).0;
         let from = Pose::new(vector(1e-3), crate::math::exp(vector(2.0)));
-        let to = Pose::new(from.position + vector(6e-3), (crate::math::exp(vector(0.3)) * from.orientation).normalize());
+        let to =
+            Pose::new(from.position + vector(6e-3), (crate::math::exp(vector(0.3)) * from.orientation).normalize());
         let middle = vector(4e-3);
         let x = line(middle - vector(3e-3), middle + vector(3e-3), 1);
         let y: Vec<DVec3> = x.iter().map(|p| *p + vector(6e-3)).collect();

@@ -1,4 +1,5 @@
-//! Which pieces may touch, and whether a substep's motion was allowed. Knows positions only; what contacts do is in `row`.
+//! Which pieces may touch, and whether a substep's motion was allowed. Knows positions only; what contacts do is in
+//! `row`.
 
 pub(crate) mod overlap;
 pub(crate) mod segment;
@@ -27,7 +28,8 @@ pub(crate) struct Candidates {
     pub threads: Vec<(u32, u32)>,
     /// Shape slot and element.
     pub shapes: Vec<(u32, u32)>,
-    /// Boxes of the living shapes, all the way from the start of the substep to the iterate, in the order of their slots.
+    /// Boxes of the living shapes, all the way from the start of the substep to the iterate, in the order of their
+    /// slots.
     shape_bounds: Vec<(DVec3, DVec3)>,
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
@@ -45,8 +47,8 @@ pub(crate) struct Clearance {
     pub shape: Option<f64>,
 }
 
-/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at least cos(1 / 2) = 0.87
-/// of the arc between them apart, 2.7 radii if they are no neighbors.
+/// Turning of a piece of thread \[rad\] up to which its own elements need not be looked at: two points on it are at
+/// least cos(1 / 2) = 0.87 of the arc between them apart, 2.7 radii if they are no neighbors.
 const STRAIGHT: f64 = 1.0;
 /// Turning of such a piece after the substep beyond which it has to be looked at after all: cos(3 / 4) pi > 2.2.
 const BENT: f64 = 1.5;
@@ -75,12 +77,15 @@ fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
     }
 }
 
-/// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than half a turn of the
-/// thread's own radius. Likewise by way of a weld.
+/// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than
+/// half a turn of the thread's own radius. Likewise by way of a weld.
 #[inline]
 fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> bool {
     arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] && model.rod_of[a] == model.rod_of[b]
-        || model.welds.iter().any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.exempt)
+        || model
+            .welds
+            .iter()
+            .any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.exempt)
 }
 
 /// Rest arc between an element and a weld along its own thread; infinite where that is not joined there.
@@ -92,8 +97,8 @@ fn way_to_weld(model: &Model, arc: &[f64], weld: &WeldModel, e: usize) -> f64 {
     weld.members.iter().map(way).fold(f64::INFINITY, f64::min)
 }
 
-/// Up to which way through a new weld elements of its threads do not touch: less than half a turn, or as far as they overlap there now because
-/// they run into each other at an acute angle.
+/// Up to which way through a new weld elements of its threads do not touch: less than half a turn, or as far as they
+/// overlap there now because they run into each other at an acute angle.
 pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
     // Where legs that meet at an angle a are a diameter apart they are r / sin(a / 2) long: 40 radii at 3 degrees.
     const FARTHEST: f64 = 40.0;
@@ -105,7 +110,8 @@ pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
     let mut exempt = weld.exempt;
     for (k, a) in legs.iter().enumerate() {
         for b in &legs[k + 1..] {
-            let own = model.rod_of[*a] == model.rod_of[*b] && arc[*b] - arc[*a + 1] < core::f64::consts::PI * radius(*a);
+            let own =
+                model.rod_of[*a] == model.rod_of[*b] && arc[*b] - arc[*a + 1] < core::f64::consts::PI * radius(*a);
             let apart = segment::closest(x[*a], x[*a + 1], x[*b], x[*b + 1]).apart.length();
             if !own && apart < (radius(*a) + radius(*b)) * (1.0 + params::KEEP) {
                 let way = way_to_weld(model, &arc, weld, *a) + way_to_weld(model, &arc, weld, *b);
@@ -126,8 +132,8 @@ fn arcs(model: &Model, arc: &mut Vec<f64>) {
     }
 }
 
-/// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the iterate, with
-/// room for what Newton will add.
+/// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the
+/// iterate, with room for what Newton will add.
 pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
     let Candidates { threads, shapes, shape_bounds, arc, tree, turned, straight } = candidates;
@@ -188,9 +194,15 @@ pub(crate) struct Pressed {
     pub shape: fn(&Scratch, u32, usize) -> f64,
 }
 
-/// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and still approach,
-/// nothing may have passed through. `pressed` says how deep the forces near two elements, and near an element and a shape, press them into each other \[m\].
-pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed: Pressed) -> Result<Clearance, Refused> {
+/// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and
+/// still approach, nothing may have passed through. `pressed` says how deep the forces near two elements, and near an
+/// element and a shape, press them into each other \[m\].
+pub(crate) fn sweep(
+    model: &Model,
+    state: &State,
+    scratch: &mut Scratch,
+    pressed: Pressed,
+) -> Result<Clearance, Refused> {
     if outran(model, state, scratch) {
         detect(model, state, scratch);
     }
@@ -214,7 +226,8 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed
             continue;
         }
         let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]).apart.length();
-        if gap < -params::OVERLAP && params::overlaps((before - sum) / sum, gap, (pressed.threads)(scratch, a, b) / sum) {
+        if gap < -params::OVERLAP && params::overlaps((before - sum) / sum, gap, (pressed.threads)(scratch, a, b) / sum)
+        {
             return Err(Refused { reason: Rejection::ThreadOverlap, rods: [model.rod_of[a], model.rod_of[b]] });
         }
         if before - moved < params::PASS * sum && passes(start, x, a, b, params::PASS * sum.min(before)) {
@@ -232,7 +245,8 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed
         let (start_pose, pose) = (&start_shape_pose[k], &state.shape_pose[k]);
         let from = [start[e], start[e + 1]].map(|p| start_pose.inverse_transform_point(p));
         let to = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
-        let first = last.filter(|(at, _)| *at == (*slot, e)).map_or_else(|| collider.distance_local(to[0]), |(_, seen)| seen);
+        let first =
+            last.filter(|(at, _)| *at == (*slot, e)).map_or_else(|| collider.distance_local(to[0]), |(_, seen)| seen);
         let second = collider.distance_local(to[1]);
         last = Some(((*slot, e + 1), second));
         let mut judge = |s: f64, value: f64| {
@@ -243,7 +257,11 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed
             }
             let before = collider.distance_local(from[0].lerp(from[1], s)).value;
             let pressed = (pressed.shape)(scratch, *slot, e) / (2.0 * r);
-            if params::overlaps((before - r) / (2.0 * r), gap, pressed) { Err(refused(Rejection::ShapeOverlap)) } else { Ok(()) }
+            if params::overlaps((before - r) / (2.0 * r), gap, pressed) {
+                Err(refused(Rejection::ShapeOverlap))
+            } else {
+                Ok(())
+            }
         };
         judge(0.0, first.value)?;
         judge(1.0, second.value)?;
@@ -261,14 +279,18 @@ pub(crate) fn sweep(model: &Model, state: &State, scratch: &mut Scratch, pressed
         // Seen from the shape, whichever of the two moves.
         let moved = (to[0] - from[0]).length().max((to[1] - from[1]).length());
         let near = first.value.min(second.value) - 0.5 * (to[1] - to[0]).length() - moved;
-        if near < params::PASS_SHAPE * r && moved > 0.5 * params::PASS_SHAPE * r && passes_shape(collider, from, to, moved, params::PASS_SHAPE * r) {
+        if near < params::PASS_SHAPE * r
+            && moved > 0.5 * params::PASS_SHAPE * r
+            && passes_shape(collider, from, to, moved, params::PASS_SHAPE * r)
+        {
             return Err(refused(Rejection::ShapePassage));
         }
     }
     Ok(clearance)
 }
 
-/// Whether the iterate, or a shape that is pushed, left the boxes in which candidates were sought, or bent a piece that was taken as straight.
+/// Whether the iterate, or a shape that is pushed, left the boxes in which candidates were sought, or bent a piece that
+/// was taken as straight.
 fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { candidates, radius, .. } = scratch;
     let x = &state.position;
@@ -278,12 +300,15 @@ fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
         let (lo, hi) = (b.lo + keep, b.hi - keep);
         x[e].min(x[e + 1]).cmplt(lo).any() || x[e].max(x[e + 1]).cmpgt(hi).any()
     });
-    let pushed = model.shapes.iter().zip(&candidates.shape_bounds).filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. })).any(
-        |((slot, shape), (lo, hi))| {
+    let pushed = model
+        .shapes
+        .iter()
+        .zip(&candidates.shape_bounds)
+        .filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. }))
+        .any(|((slot, shape), (lo, hi))| {
             let (now_lo, now_hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
             now_lo.cmplt(*lo).any() || now_hi.cmpgt(*hi).any()
-        },
-    );
+        });
     left || pushed || {
         // Both lanes the same: there is one centerline to look at.
         turning(model, [x, x], &mut candidates.turned);
@@ -297,11 +322,16 @@ fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
 pub(crate) fn relative_motion(from: &[DVec3], to: &[DVec3], a: usize, b: usize) -> f64 {
     let d = |i: usize| to[i] - from[i];
     let (a0, a1, b0, b1) = (d(a), d(a + 1), d(b), d(b + 1));
-    (a0 - b0).length_squared().max((a0 - b1).length_squared()).max((a1 - b0).length_squared()).max((a1 - b1).length_squared()).sqrt()
+    (a0 - b0)
+        .length_squared()
+        .max((a0 - b1).length_squared())
+        .max((a1 - b0).length_squared())
+        .max((a1 - b1).length_squared())
+        .sqrt()
 }
 
-/// Whether the centerlines come nearer than `least` on the straight way between two states (conservative advancement: at distance d no
-/// contact can come before d / relative motion).
+/// Whether the centerlines come nearer than `least` on the straight way between two states (conservative advancement:
+/// at distance d no contact can come before d / relative motion).
 fn passes(from: &[DVec3], to: &[DVec3], a: usize, b: usize, least: f64) -> bool {
     let moved = relative_motion(from, to, a, b);
     let mut u = 0.0;
@@ -353,7 +383,9 @@ mod tests {
     fn straight_thread() -> (Model, State, Scratch, f64) {
         let r = 1e-4;
         let mut world = World::default();
-        world.insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (100.0 * r), 100, r, Material::elastic(1e9, 1000.0))).unwrap();
+        world
+            .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (100.0 * r), 100, r, Material::elastic(1e9, 1000.0)))
+            .unwrap();
         let (model, state) = world.into_parts();
         let mut scratch = Scratch::default();
         scratch.fit(&model);

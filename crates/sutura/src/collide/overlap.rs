@@ -1,10 +1,11 @@
-//! What lies in each other at one state, whatever brought it there. Nothing here judges a motion (`sweep` does): a thread may be inserted across another one, a
-//! shape put onto a thread.
+//! What lies in each other at one state, whatever brought it there. Nothing here judges a motion (`sweep` does): a
+//! thread may be inserted across another one, a shape put onto a thread.
 //!
-//! Contact parts what is pressed into each other as long as the centerlines say where to. Where a centerline runs within another thread, in a solid or across a
-//! mesh, what comes of it is a knot that nobody tied, or none.
+//! Contact parts what is pressed into each other as long as the centerlines say where to. Where a centerline runs
+//! within another thread, in a solid or across a mesh, what comes of it is a knot that nobody tied, or none.
 //!
-//! Left out is what contact leaves out (neighbors along a thread and through a weld), and what is pressed in by less than `PRESSED`.
+//! Left out is what contact leaves out (neighbors along a thread and through a weld), and what is pressed in by less
+//! than `PRESSED`.
 
 use super::tree::{Bounds, Tree};
 use super::{Collider, arcs, neighbors, segment, turning};
@@ -31,13 +32,13 @@ pub struct Overlap {
     pub with: OverlapWith,
     /// World point of the place \[m\]: halfway between two centerlines; with a shape on that of the thread.
     pub point: DVec3,
-    /// How deep \[m\]: the sum of radii less the distance of centerlines; the radius less the distance of the centerline from the surface, which is negative in
-    /// a solid.
+    /// How deep \[m\]: the sum of radii less the distance of centerlines; the radius less the distance of the
+    /// centerline from the surface, which is negative in a solid.
     pub depth: f64,
     /// The same over the diameter of the thread, of two their mean.
     pub diameters: f64,
-    /// Whether a centerline runs within the other thread, in the solid or across the mesh: contact cannot know on which side of it the thread belongs. What is
-    /// only pressed into each other is pushed apart.
+    /// Whether a centerline runs within the other thread, in the solid or across the mesh: contact cannot know on which
+    /// side of it the thread belongs. What is only pressed into each other is pushed apart.
     pub through: bool,
 }
 
@@ -124,7 +125,9 @@ impl Seen<'_> {
         // What is nearly straight does not meet itself.
         let mut turned = Vec::new();
         turning(model, [x, x], &mut turned);
-        let straight = |range: Range<usize>| range.start >= n || turned[range.end.min(n) - 1][0] - turned[range.start][0] <= super::STRAIGHT;
+        let straight = |range: Range<usize>| {
+            range.start >= n || turned[range.end.min(n) - 1][0] - turned[range.start][0] <= super::STRAIGHT
+        };
         let mut pairs: BTreeMap<(usize, usize), Pair> = BTreeMap::new();
         tree.pairs(straight, |a, b| {
             if neighbors(model, arc, radius, a, b) {
@@ -136,8 +139,11 @@ impl Seen<'_> {
                 // One element more on each side would do.
                 let next = |e: usize| if model.is_element(e) { model.rest_length[e] } else { 0.0 };
                 let room = next(a) + next(b);
-                let along = model.rod_of[a] == model.rod_of[b] && arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] + room;
-                let fork = |w: &crate::model::weld::WeldModel| super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b) < w.exempt + room;
+                let along = model.rod_of[a] == model.rod_of[b]
+                    && arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] + room;
+                let fork = |w: &crate::model::weld::WeldModel| {
+                    super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b) < w.exempt + room
+                };
                 let fold = along || model.welds.iter().any(|(_, w)| fork(w));
                 pairs.insert((a, b), Pair { a, b, s: c.s, t: c.t, apart, fold });
             }
@@ -197,14 +203,16 @@ impl Seen<'_> {
             let (a, b) = (x[e], x[e + 1]);
             let mut hit = if matches!(shape.geometry, Geometry::Mesh { .. }) {
                 let crossing = crossing(&shape.collider, pose, a, b);
-                let within = shape.closed && inside.filter(|(at, _)| *at == e).map_or_else(|| in_solid(shape, pose, a), |(_, is)| is);
+                let within = shape.closed
+                    && inside.filter(|(at, _)| *at == e).map_or_else(|| in_solid(shape, pose, a), |(_, is)| is);
                 let beyond = if crossing.is_some() { shape.closed && in_solid(shape, pose, b) } else { within };
                 inside = Some((e + 1, beyond));
                 match crossing {
                     Some(s) => {
                         let ends = [(0.0, a, within), (1.0, b, beyond)].into_iter().filter(|end| end.2);
                         let deep = |(s, p, _)| (s, -shape.collider.distance(pose, p).value.abs());
-                        let (s, distance) = ends.map(deep).fold((s, 0.0), |best, end| if end.1 < best.1 { end } else { best });
+                        let (s, distance) =
+                            ends.map(deep).fold((s, 0.0), |best, end| if end.1 < best.1 { end } else { best });
                         Hit { element: e, s, distance, crosses: true }
                     }
                     None => {
@@ -212,7 +220,9 @@ impl Seen<'_> {
                         let middle = away(0.5);
                         let (s, distance) = if within {
                             // As deep as the deepest particle; searching between them costs more than it tells.
-                            [(0.0, -away(0.0)), (0.5, -middle), (1.0, -away(1.0))].into_iter().fold((0.0, 0.0), |l, p| if p.1 < l.1 { p } else { l })
+                            [(0.0, -away(0.0)), (0.5, -middle), (1.0, -away(1.0))]
+                                .into_iter()
+                                .fold((0.0, 0.0), |l, p| if p.1 < l.1 { p } else { l })
                         } else if middle - 0.5 * a.distance(b) > radius[e] {
                             // A distance grows no faster than the way.
                             continue;
@@ -264,8 +274,8 @@ fn in_solid(shape: &ShapeModel, pose: &Pose, point: DVec3) -> bool {
     turns > 0.5
 }
 
-/// The least of a function on [0, 1] and where it is: that of a convex one within a ten thousandth. Where it is not a number, as in the very middle of a
-/// ball, it does not count.
+/// The least of a function on [0, 1] and where it is: that of a convex one within a ten thousandth. Where it is not a
+/// number, as in the very middle of a ball, it does not count.
 fn least(at: impl Fn(f64) -> f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.381_966_011_250_105;
     let mut best = (0.0, at(0.0));
@@ -347,7 +357,8 @@ mod tests {
             prop_assert_eq!(solid.len(), mesh.len());
             for (a, b) in solid.iter().zip(&mesh) {
                 prop_assert_eq!(a.through, b.through);
-                // What crosses the surface between two particles is as deep in the mesh as the deepest place of the other elements.
+                // What crosses the surface between two particles is as deep in the mesh as the deepest place of the
+                // other elements.
                 prop_assert!((a.depth - b.depth).abs() < if a.through { 2.5e-4 } else { 1e-8 }, "{:?} {:?}", a, b);
             }
         }
@@ -366,7 +377,13 @@ mod tests {
             let found = w.overlaps();
             assert_eq!(found.len(), 1);
             let o = found[0];
-            assert!(o.with == OverlapWith::Shape(shape) && o.through && (o.depth - 1.1e-3).abs() < 2e-8 && (o.arc - 4e-3).abs() < 1e-6, "{o:?}");
+            assert!(
+                o.with == OverlapWith::Shape(shape)
+                    && o.through
+                    && (o.depth - 1.1e-3).abs() < 2e-8
+                    && (o.arc - 4e-3).abs() < 1e-6,
+                "{o:?}"
+            );
         }
     }
 
@@ -375,8 +392,20 @@ mod tests {
         let half = 1e-3;
         let sign = |b: u32| if b == 0 { -half } else { half };
         let vertices: Vec<DVec3> = (0..8).map(|k| DVec3::new(sign(k & 1), sign(k >> 1 & 1), sign(k >> 2))).collect();
-        let triangles =
-            vec![[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]];
+        let triangles = vec![
+            [0, 1, 3],
+            [0, 3, 2],
+            [4, 6, 7],
+            [4, 7, 5],
+            [0, 4, 5],
+            [0, 5, 1],
+            [2, 3, 7],
+            [2, 7, 6],
+            [0, 2, 6],
+            [0, 6, 4],
+            [1, 5, 7],
+            [1, 7, 3],
+        ];
         let geometry = Geometry::Mesh { vertices, triangles };
         let inside = |from: f64, to: f64| {
             let mut w = world(&[line(DVec3::X * from, DVec3::X * to)]);
@@ -396,9 +425,13 @@ mod tests {
             vertices: [(-1.0, -1.0), (1.0, -1.0), (0.0, 1.0)].map(|(y, z)| DVec3::new(0.0, y, z) * 1e-3).to_vec(),
             triangles: vec![[0, 1, 2]],
         };
-        let mut w = world(&[line(DVec3::X * -4e-3, DVec3::X * 5e-3), line(DVec3::new(0.6e-4, -1e-3, 0.0), DVec3::new(0.6e-4, 1e-3, 0.0))]);
+        let mut w = world(&[
+            line(DVec3::X * -4e-3, DVec3::X * 5e-3),
+            line(DVec3::new(0.6e-4, -1e-3, 0.0), DVec3::new(0.6e-4, 1e-3, 0.0)),
+        ]);
         w.insert_shape(&ShapeSpec::fixed(sheet, Pose::IDENTITY)).unwrap();
-        let found: Vec<Overlap> = w.overlaps().into_iter().filter(|o| matches!(o.with, OverlapWith::Shape(_))).collect();
+        let found: Vec<Overlap> =
+            w.overlaps().into_iter().filter(|o| matches!(o.with, OverlapWith::Shape(_))).collect();
         assert_eq!(found.len(), 2);
         assert!(found[0].through && (found[0].arc - 4e-3).abs() < 1e-12 && (found[0].depth - R).abs() < 1e-15);
         assert!(!found[1].through && (found[1].depth - 0.4e-4).abs() < 1e-9);
@@ -433,7 +466,10 @@ mod tests {
             let tooth = (u - u.floor() - 0.5).abs() * 4.0 - 1.0;
             DVec3::new(0.004 * u + 0.001, 0.002 * tooth * if u as i64 % 2 == 0 { 1.0 } else { -1.0 }, 0.0)
         });
-        let w = world(&[line(DVec3::ZERO, DVec3::X * 0.02), RodSpec::new(points.collect(), R, Material::elastic(1e9, 1000.0))]);
+        let w = world(&[
+            line(DVec3::ZERO, DVec3::X * 0.02),
+            RodSpec::new(points.collect(), R, Material::elastic(1e9, 1000.0)),
+        ]);
         let found = w.overlaps();
         assert!(found.len() >= 4 && found.iter().all(|o| o.through && o.diameters > 0.9), "{found:?}");
     }

@@ -10,7 +10,8 @@ pub(crate) struct Closest {
     pub apart: DVec3,
 }
 
-/// Closest points of segments p0 p1 and q0 q1 (Ericson, Real-Time Collision Detection, 5.1.9, in the form that clamps one place at a time).
+/// Closest points of segments p0 p1 and q0 q1 (Ericson, Real-Time Collision Detection, 5.1.9, in the form that clamps
+/// one place at a time).
 #[inline]
 pub(crate) fn closest(p0: DVec3, p1: DVec3, q0: DVec3, q1: DVec3) -> Closest {
     let (u, v, w) = (p1 - p0, q1 - q0, p0 - q0);

@@ -22,10 +22,12 @@ pub(crate) enum Collider {
 /// A triangle mesh ready for queries.
 pub(crate) struct Surface {
     mesh: TriMesh,
-    /// Every edge belongs to two triangles that run along it in opposite directions: normals point out of the solid. Of an open mesh both sides are outside.
+    /// Every edge belongs to two triangles that run along it in opposite directions: normals point out of the solid. Of
+    /// an open mesh both sides are outside.
     closed: bool,
     edges: Vec<Edge>,
-    /// Edges of each triangle, in the order of [`TriMesh::triangle`]: from its first corner, from its second, from its third.
+    /// Edges of each triangle, in the order of [`TriMesh::triangle`]: from its first corner, from its second, from its
+    /// third.
     edges_of: Vec<[u32; 3]>,
 }
 
@@ -48,10 +50,12 @@ pub(crate) struct Distance {
 /// Walls of a mesh that a particle may touch at once.
 const WALLS: usize = 8;
 
-/// Sine of the angle up to which the direction from an edge may lean over a triangle beside it and still be that of a nearest place.
+/// Sine of the angle up to which the direction from an edge may lean over a triangle beside it and still be that of a
+/// nearest place.
 const LEAN: f64 = 1e-6;
 
-/// Cosine up to which two nearest places of a mesh count as on different walls: two facets with a hollow edge between them are.
+/// Cosine up to which two nearest places of a mesh count as on different walls: two facets with a hollow edge between
+/// them are.
 pub(crate) const APART: f64 = 0.9999;
 
 /// Places that are looked at for the least distance of a segment from a convex solid.
@@ -73,8 +77,12 @@ impl Collider {
         Ok(match geometry {
             Geometry::Plane => Collider::Plane,
             Geometry::Sphere { radius } => Collider::Solid(Box::new(Ball::new(*radius))),
-            Geometry::Capsule { radius, half_length } => Collider::Solid(Box::new(Capsule::new_y(*half_length, *radius))),
-            Geometry::Cylinder { radius, half_length } => Collider::Solid(Box::new(Cylinder::new(*half_length, *radius))),
+            Geometry::Capsule { radius, half_length } => {
+                Collider::Solid(Box::new(Capsule::new_y(*half_length, *radius)))
+            }
+            Geometry::Cylinder { radius, half_length } => {
+                Collider::Solid(Box::new(Cylinder::new(*half_length, *radius)))
+            }
             Geometry::Box { half_sides } => Collider::Solid(Box::new(Cuboid::new(to_parry(*half_sides).abs()))),
             Geometry::Mesh { vertices, triangles } => Collider::Surface(Box::new(Surface::new(vertices, triangles)?)),
         })
@@ -102,9 +110,11 @@ impl Collider {
         Distance { value: sign * length, normal }
     }
 
-    /// Distance of a point that came from a place with the distance `before`, from the same part of the surface. (`from` and `to` are the pose of the shape and the
-    /// point, then and now; `ahead` is the direction in which the surface faced at the last look.) What is nearest now may be another wall, or the far side of a
-    /// thin one: it faces back, or is nearer than a convex surface would be that is tangent to the one there was. Then the surface is taken to go on as a plane.
+    /// Distance of a point that came from a place with the distance `before`, from the same part of the surface.
+    /// (`from` and `to` are the pose of the shape and the point, then and now; `ahead` is the direction in which the
+    /// surface faced at the last look.) What is nearest now may be another wall, or the far side of a thin one: it
+    /// faces back, or is nearer than a convex surface would be that is tangent to the one there was. Then the surface
+    /// is taken to go on as a plane.
     pub fn follow(&self, from: (&Pose, DVec3, Distance), to: (&Pose, DVec3), ahead: DVec3) -> Distance {
         let now = self.distance(to.0, to.1);
         let faces = now.normal.dot(ahead) > 0.0;
@@ -115,7 +125,8 @@ impl Collider {
         if faces && now.value >= plane.value - CONVEX * plane.value.abs() { now } else { plane }
     }
 
-    /// Calls `found` with the distances, up to `reach`, of a world point from all walls of a mesh that face it from different sides, but for the nearest one.
+    /// Calls `found` with the distances, up to `reach`, of a world point from all walls of a mesh that face it from
+    /// different sides, but for the nearest one.
     pub fn further_walls(&self, pose: &Pose, point: DVec3, reach: f64, mut found: impl FnMut(Distance)) {
         let Collider::Surface(surface) = self else { return };
         let local = pose.inverse_transform_point(point);
@@ -125,7 +136,8 @@ impl Collider {
         }
         let mut walls = [first; WALLS];
         let mut count = 1;
-        // From the nearest to the farthest, as few as there are: each time the nearest of those that are apart from all others.
+        // From the nearest to the farthest, as few as there are: each time the nearest of those that are apart from all
+        // others.
         while count < walls.len() {
             let Some(next) = surface.nearest_wall(local, reach, &walls[..count]) else { break };
             walls[count] = next;
@@ -134,9 +146,16 @@ impl Collider {
         }
     }
 
-    /// Places in (0, 1) on the segment (body frame) where its distance is least, as far as they are nearer than `below`, with their distances. Of a convex solid
-    /// there is one at most. Of a mesh they lie on edges, and where the segment passes through it. `known` are the distances of its ends.
-    pub fn least_between(&self, ends: [DVec3; 2], known: [Distance; 2], below: f64, mut found: impl FnMut(f64, Distance)) {
+    /// Places in (0, 1) on the segment (body frame) where its distance is least, as far as they are nearer than
+    /// `below`, with their distances. Of a convex solid there is one at most. Of a mesh they lie on edges, and where
+    /// the segment passes through it. `known` are the distances of its ends.
+    pub fn least_between(
+        &self,
+        ends: [DVec3; 2],
+        known: [Distance; 2],
+        below: f64,
+        mut found: impl FnMut(f64, Distance),
+    ) {
         match self {
             // Greatest and least are at the ends.
             Collider::Plane => {}
@@ -149,7 +168,8 @@ impl Collider {
         }
     }
 
-    /// Least distance of the segment (body frame) from the shape, zero or less where they meet, and a place where it is; nothing beyond `below`.
+    /// Least distance of the segment (body frame) from the shape, zero or less where they meet, and a place where it
+    /// is; nothing beyond `below`.
     pub fn segment_distance(&self, [a, b]: [DVec3; 2], below: f64) -> Option<(f64, f64)> {
         let known = [self.distance_local(a), self.distance_local(b)];
         let [first, last] = known.map(|d| d.value);
@@ -164,9 +184,9 @@ impl Collider {
         (least.1 < below).then_some(least)
     }
 
-    /// Place in (0, 1) on the segment where the distance, convex along it, is least, where that is less than `below`. Tangents at both sides bound it from below. The
-    /// next place to look at is where the slope would vanish if it changed evenly, which is so on a smooth surface, and where the tangents meet, which
-    /// is so at an edge, in turn.
+    /// Place in (0, 1) on the segment where the distance, convex along it, is least, where that is less than `below`.
+    /// Tangents at both sides bound it from below. The next place to look at is where the slope would vanish if it
+    /// changed evenly, which is so on a smooth surface, and where the tangents meet, which is so at an edge, in turn.
     fn least_of_convex(&self, [a, b]: [DVec3; 2], known: [Distance; 2], below: f64) -> Option<(f64, Distance)> {
         let along = b - a;
         let side = |s: f64, d: Distance| (s, d, d.normal.dot(along));
@@ -210,7 +230,11 @@ impl Collider {
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for k in 0..8 {
             let pick = |bit: usize, a: f64, b: f64| if k >> bit & 1 == 0 { a } else { b };
-            let corner = DVec3::new(pick(0, local.mins.x, local.maxs.x), pick(1, local.mins.y, local.maxs.y), pick(2, local.mins.z, local.maxs.z));
+            let corner = DVec3::new(
+                pick(0, local.mins.x, local.maxs.x),
+                pick(1, local.mins.y, local.maxs.y),
+                pick(2, local.mins.z, local.maxs.z),
+            );
             let p = pose.transform_point(from_parry(corner));
             lo = lo.min(p);
             hi = hi.max(p);
@@ -246,7 +270,8 @@ fn plane((from_pose, from, before): (&Pose, DVec3, Distance), (pose, point): (&P
 impl Surface {
     fn new(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Self, Error> {
         let bad = |e: &dyn core::fmt::Debug| Error::invalid("shape", "mesh", e, "a mesh that can be searched");
-        let mut mesh = TriMesh::new(vertices.iter().map(|v| to_parry(*v)).collect(), triangles.to_vec()).map_err(|e| bad(&e))?;
+        let mut mesh =
+            TriMesh::new(vertices.iter().map(|v| to_parry(*v)).collect(), triangles.to_vec()).map_err(|e| bad(&e))?;
         // Each side of a triangle, by its ends in order.
         let mut sides: Vec<([u32; 2], u32, usize)> = Vec::with_capacity(3 * triangles.len());
         for (k, t) in triangles.iter().enumerate() {
@@ -295,7 +320,8 @@ impl Surface {
         self.mesh.bvh().leaves(move |node: &parry3d_f64::partitioning::BvhNode| node.intersects(&query))
     }
 
-    /// The nearest place that is apart from all `known` ones, faces the point and is a nearest place among its neighbors.
+    /// The nearest place that is apart from all `known` ones, faces the point and is a nearest place among its
+    /// neighbors.
     fn nearest_wall(&self, p: DVec3, reach: f64, known: &[Distance]) -> Option<Distance> {
         let mut best: Option<Distance> = None;
         for k in self.near(p, p, reach) {
@@ -310,7 +336,8 @@ impl Surface {
             if known.iter().any(|w| w.normal.dot(normal) > APART) {
                 continue;
             }
-            // Where the foot is on an edge, the triangle on the other side must not come nearer; where it is on a corner, it is another's if any.
+            // Where the foot is on an edge, the triangle on the other side must not come nearer; where it is on a
+            // corner, it is another's if any.
             let foremost = match at {
                 TrianglePointLocation::OnEdge(i, _) => {
                     // Parry numbers AB, BC, AC.
@@ -324,7 +351,10 @@ impl Surface {
                     self.near(corner, corner, 0.0).all(|t| {
                         let [a, b, c] = self.mesh.indices()[t as usize];
                         ![a, b, c].contains(&v)
-                            || [a, b, c].iter().all(|w| (from_parry(self.mesh.vertices()[*w as usize]) - corner).dot(normal) <= LEAN * (value + 1.0))
+                            || [a, b, c].iter().all(|w| {
+                                (from_parry(self.mesh.vertices()[*w as usize]) - corner).dot(normal)
+                                    <= LEAN * (value + 1.0)
+                            })
                     })
                 }
                 _ => true,
@@ -345,7 +375,9 @@ impl Surface {
                 if d.value < same.1.value {
                     *same = (s, d);
                 }
-            } else if let Some(last) = places.iter_mut().max_by(|x, y| x.1.value.total_cmp(&y.1.value)).filter(|last| d.value < last.1.value) {
+            } else if let Some(last) =
+                places.iter_mut().max_by(|x, y| x.1.value.total_cmp(&y.1.value)).filter(|last| d.value < last.1.value)
+            {
                 *last = (s, d);
             }
         };
@@ -427,7 +459,8 @@ mod tests {
 
     /// Corners and triangles of a box about the origin, outward.
     fn box_mesh(half: DVec3) -> Geometry {
-        let vertices = (0..8).map(|k| DVec3::select(glam::BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), half, -half)).collect();
+        let vertices =
+            (0..8).map(|k| DVec3::select(glam::BVec3::new(k & 1 > 0, k & 2 > 0, k & 4 > 0), half, -half)).collect();
         let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
         Geometry::Mesh { vertices, triangles }
@@ -436,7 +469,8 @@ mod tests {
     #[test]
     fn a_closed_mesh_is_as_the_solid_that_it_bounds() {
         let half = DVec3::new(1e-3, 2e-3, 5e-4);
-        let (mesh, solid) = (Collider::new(&box_mesh(half)).unwrap(), Collider::new(&Geometry::Box { half_sides: half }).unwrap());
+        let (mesh, solid) =
+            (Collider::new(&box_mesh(half)).unwrap(), Collider::new(&Geometry::Box { half_sides: half }).unwrap());
         assert!(matches!(&mesh, Collider::Surface(s) if s.closed));
         for i in 0..500_u32 {
             let f = |k: u32| (f64::from(i * 7 + k * 131) * 0.618_033_988_7).fract() - 0.5;
@@ -453,19 +487,29 @@ mod tests {
     fn a_wall_under_an_element_has_two_edges() {
         let mesh = Collider::new(&box_mesh(DVec3::new(2e-4, 1e-2, 1e-2))).unwrap();
         let found = least(&mesh, [DVec3::new(-1e-3, 0.0, 1.01e-2), DVec3::new(1e-3, 0.0, 1.01e-2)], 2e-4);
-        assert!(found.iter().any(|(s, _)| (s - 0.4).abs() < 1e-9) && found.iter().any(|(s, _)| (s - 0.6).abs() < 1e-9), "{found:?}");
+        assert!(
+            found.iter().any(|(s, _)| (s - 0.4).abs() < 1e-9) && found.iter().any(|(s, _)| (s - 0.6).abs() < 1e-9),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn both_walls_of_a_slot_are_seen_and_neither_is_taken_for_the_other() {
-        let square = |z: f64| [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x * 1e-2, y * 1e-2, z));
+        let square = |z: f64| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| DVec3::new(x * 1e-2, y * 1e-2, z))
+        };
         let vertices = [square(-1e-3), square(1e-3)].concat();
-        let c = Collider::new(&Geometry::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]] }).unwrap();
+        let c =
+            Collider::new(&Geometry::Mesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]] })
+                .unwrap();
         let pose = Pose::IDENTITY;
         let (low, high) = (DVec3::new(1e-4, 0.0, -1e-4), DVec3::new(1e-4, 0.0, 1e-4));
         let mut others = Vec::new();
         c.further_walls(&pose, low, 2e-3, |d| others.push(d));
-        assert!(others.len() == 1 && (others[0].value - 1.1e-3).abs() < 1e-15 && others[0].normal.z < -0.999, "{others:?}");
+        assert!(
+            others.len() == 1 && (others[0].value - 1.1e-3).abs() < 1e-15 && others[0].normal.z < -0.999,
+            "{others:?}"
+        );
         // Across the middle it is still above the lower wall.
         let before = c.distance(&pose, low);
         let d = c.follow((&pose, low, before), (&pose, high), before.normal);

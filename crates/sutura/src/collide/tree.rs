@@ -1,5 +1,5 @@
-//! A binary tree of boxes over the elements in array order. Neighbors along a thread are neighbors in space, so the tree never needs
-//! sorting: it is refilled bottom up.
+//! A binary tree of boxes over the elements in array order. Neighbors along a thread are neighbors in space, so the
+//! tree never needs sorting: it is refilled bottom up.
 
 use core::ops::Range;
 use glam::DVec3;
@@ -59,8 +59,8 @@ impl Tree {
         &self.nodes[self.leaves - 1 + i]
     }
 
-    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves, except where `skip` says of a range of leaves that no pair within it
-    /// matters.
+    /// Calls `found(i, j)` with i < j for all pairs of overlapping leaves, except where `skip` says of a range of
+    /// leaves that no pair within it matters.
     pub fn pairs(&mut self, skip: impl Fn(Range<usize>) -> bool, mut found: impl FnMut(usize, usize)) {
         let leaves = self.leaves as u32;
         self.pair_stack.clear();
@@ -71,7 +71,11 @@ impl Tree {
             let half = size / 2;
             if a == b {
                 if size > 1 && !skip(first(a)..first(a + 1)) {
-                    self.pair_stack.extend([(2 * a + 1, 2 * a + 1, half), (2 * a + 2, 2 * a + 2, half), (2 * a + 1, 2 * a + 2, half)]);
+                    self.pair_stack.extend([
+                        (2 * a + 1, 2 * a + 1, half),
+                        (2 * a + 2, 2 * a + 2, half),
+                        (2 * a + 1, 2 * a + 2, half),
+                    ]);
                 }
                 continue;
             }

@@ -1,6 +1,7 @@
-//! Knot diagrams: projection of a polygon, Reidemeister moves I and II, connected summands, and the invariants of each: determinant
-//! and signature from a Goeritz matrix (Gordon and Litherland 1978), Alexander polynomial from the Wirtinger relations. All of it is
-//! integer arithmetic. A positive crossing is right-handed; a right-handed trefoil has signature -2.
+//! Knot diagrams: projection of a polygon, Reidemeister moves I and II, connected summands, and the invariants of each:
+//! determinant and signature from a Goeritz matrix (Gordon and Litherland 1978), Alexander polynomial from the
+//! Wirtinger relations. All of it is integer arithmetic. A positive crossing is right-handed; a right-handed trefoil
+//! has signature -2.
 
 use super::Problem;
 use glam::DVec3;
@@ -42,7 +43,11 @@ impl Invariants {
                 alexander[i + j] = alexander[i + j].checked_add(a.checked_mul(*b)?)?;
             }
         }
-        Some(Invariants { determinant: self.determinant.checked_mul(other.determinant)?, signature: self.signature + other.signature, alexander })
+        Some(Invariants {
+            determinant: self.determinant.checked_mul(other.determinant)?,
+            signature: self.signature + other.signature,
+            alexander,
+        })
     }
 }
 
@@ -54,10 +59,11 @@ fn side(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i8 {
 }
 
 impl Diagram {
-    /// The view of a closed polygon along z. `Degenerate` when it is not in general position (a corner on an edge, three strands in a
-    /// point): another direction must be tried. `TooTangled` with more than `most` crossings.
+    /// The view of a closed polygon along z. `Degenerate` when it is not in general position (a corner on an edge,
+    /// three strands in a point): another direction must be tried. `TooTangled` with more than `most` crossings.
     pub fn project(points: &[DVec3], most: usize) -> Result<Self, Problem> {
-        // Nearer than this to each other or to a corner, in parameter of the edge, the order along the strand is in doubt.
+        // Nearer than this to each other or to a corner, in parameter of the edge, the order along the strand is in
+        // doubt.
         const TIE: f64 = 1e-9;
         let n = points.len();
         let coord = |p: DVec3| Coord { x: p.x, y: p.y };
@@ -125,8 +131,8 @@ impl Diagram {
     }
 
     /// Takes out kinks (Reidemeister I) and pairs of crossings by which one strand lies over another without being held
-    /// (Reidemeister II) until there are none. Two crossings that follow each other on both strands always bound an empty cell:
-    /// the rest of the knot cannot be on both sides of it.
+    /// (Reidemeister II) until there are none. Two crossings that follow each other on both strands always bound an
+    /// empty cell: the rest of the knot cannot be on both sides of it.
     pub fn simplify(&mut self) {
         loop {
             let (n, partner) = (self.code.len(), self.partners());
@@ -155,8 +161,9 @@ impl Diagram {
         }
     }
 
-    /// Simplifies as far as it goes without ever adding crossings, and cuts the diagram into connected summands where a stretch of the strand closes on itself: each of its crossings has both passages in it. Parts
-    /// without crossings are dropped.
+    /// Simplifies as far as it goes without ever adding crossings, and cuts the diagram into connected summands where a
+    /// stretch of the strand closes on itself: each of its crossings has both passages in it. Parts without crossings
+    /// are dropped.
     pub fn summands(mut self) -> Vec<Diagram> {
         let mut done = Vec::new();
         loop {
@@ -168,7 +175,8 @@ impl Diagram {
             self.code.rotate_left(start);
             let rest = self.code.split_off(len);
             let part = Diagram { code: core::mem::replace(&mut self.code, rest), signs: self.signs.clone() };
-            // No shorter stretch closes, so the part has no summand of its own, but closing it up may have made a kink or pair.
+            // No shorter stretch closes, so the part has no summand of its own, but closing it up may have made a kink
+            // or pair.
             done.extend(part.summands());
         }
         if !self.code.is_empty() {
@@ -218,8 +226,9 @@ impl Diagram {
         out
     }
 
-    /// Determinant, signature and Alexander polynomial. Three ways must agree (both colorings of the regions, and the polynomial at
-    /// -1); `None` when they do not, when the code does not lie in a plane, or when a number does not fit.
+    /// Determinant, signature and Alexander polynomial. Three ways must agree (both colorings of the regions, and the
+    /// polynomial at -1); `None` when they do not, when the code does not lie in a plane, or when a number does not
+    /// fit.
     pub fn invariants(&self) -> Option<Invariants> {
         if self.code.is_empty() {
             return Some(Invariants::unknot());
@@ -232,9 +241,9 @@ impl Diagram {
         (at_minus_one == determinant && at_one == 1).then_some(Invariants { determinant, signature, alexander })
     }
 
-    /// The regions of the plane. Edge k leaves passage k; it has a left side 2 k and a right side 2 k + 1, and sides that meet at a
-    /// corner are one region. Also a side at each corner of each crossing; corner k lies between its strands k and k + 1, counted
-    /// counterclockwise from the incoming lower one.
+    /// The regions of the plane. Edge k leaves passage k; it has a left side 2 k and a right side 2 k + 1, and sides
+    /// that meet at a corner are one region. Also a side at each corner of each crossing; corner k lies between its
+    /// strands k and k + 1, counted counterclockwise from the incoming lower one.
     fn regions(&self, crossings: &[(i8, usize, usize)]) -> (Regions, Vec<[usize; 4]>) {
         let n_edges = self.code.len();
         let mut region = Regions((0..2 * n_edges).collect());
@@ -243,8 +252,11 @@ impl Diagram {
         for &(sign, under, over) in crossings {
             // (edge, whether it leaves the crossing)
             let (over_in, over_out) = ((into(over), false), (over, true));
-            let strands =
-                if sign > 0 { [(into(under), false), over_out, (under, true), over_in] } else { [(into(under), false), over_in, (under, true), over_out] };
+            let strands = if sign > 0 {
+                [(into(under), false), over_out, (under, true), over_in]
+            } else {
+                [(into(under), false), over_in, (under, true), over_out]
+            };
             let mut corner = [0; 4];
             for k in 0..4 {
                 let ((e, leaves), (f, next_leaves)) = (strands[k], strands[(k + 1) % 4]);
@@ -258,8 +270,8 @@ impl Diagram {
         (region, corners)
     }
 
-    /// Lays a strand that goes over (or under) everything it meets somewhere else, where it meets less: between its ends any way over
-    /// all else is as good. Whether there was such a strand.
+    /// Lays a strand that goes over (or under) everything it meets somewhere else, where it meets less: between its
+    /// ends any way over all else is as good. Whether there was such a strand.
     fn lay_strand_shorter(&mut self) -> bool {
         let n = self.code.len();
         let (base, _) = self.regions(&self.crossings());
@@ -287,7 +299,8 @@ impl Diagram {
         false
     }
 
-    /// Takes out the strand of `len` passages from `start` on and leads it across the edges of `path`; true is from their left side.
+    /// Takes out the strand of `len` passages from `start` on and leads it across the edges of `path`; true is from
+    /// their left side.
     fn replace_strand(&mut self, start: usize, len: usize, path: &[(usize, bool)]) {
         let (n, partner) = (self.code.len(), self.partners());
         let over = self.code[start].over;
@@ -326,7 +339,8 @@ impl Diagram {
         if n_regions != crossings.len() + 2 {
             return None;
         }
-        // Checkerboard: the two sides of an edge differ. Along the strand from one edge to the next the sides swap color.
+        // Checkerboard: the two sides of an edge differ. Along the strand from one edge to the next the sides swap
+        // color.
         let mut color = vec![None; 2 * n_edges];
         for k in 0..n_edges {
             for (side, c) in [(2 * k, k % 2 == 0), (2 * k + 1, k % 2 == 1)] {
@@ -426,8 +440,8 @@ impl Regions {
         let (a, b) = (self.find(a), self.find(b));
         self.0[a] = b;
     }
-    /// Edges to cross on the shortest way from one region to another, at most `longest`, none of those that are `closed`; true
-    /// where it is crossed from its left side.
+    /// Edges to cross on the shortest way from one region to another, at most `longest`, none of those that are
+    /// `closed`; true where it is crossed from its left side.
     fn shortest_path(&mut self, closed: &[bool], from: usize, to: usize, longest: usize) -> Option<Vec<(usize, bool)>> {
         // (region before, edge, from left)
         let mut came: Vec<Option<(usize, usize, bool)>> = vec![None; self.0.len()];

@@ -1,13 +1,14 @@
 //! Where a thread enters its knot.
 //!
-//! A place on the thread is in touch when another part of the same thread, more than `2 pi r` of thread away (so that a bend is not
-//! taken for a contact), is nearer than 1.2 diameters, centerline to centerline. Stretches of places in touch, joined over gaps of
-//! under 4 diameters, form a knot when they touch each other; the largest such group by length is the knot, so that a tail that lies
-//! across the loop is left out. The knot's first and last place are where the tails enter. The longest gap between is the loop, when
-//! it is longer than 10 diameters, which is all the thread that a tight overhand knot holds.
+//! A place on the thread is in touch when another part of the same thread, more than `2 pi r` of thread away (so that a
+//! bend is not taken for a contact), is nearer than 1.2 diameters, centerline to centerline. Stretches of places in
+//! touch, joined over gaps of under 4 diameters, form a knot when they touch each other; the largest such group by
+//! length is the knot, so that a tail that lies across the loop is left out. The knot's first and last place are where
+//! the tails enter. The longest gap between is the loop, when it is longer than 10 diameters, which is all the thread
+//! that a tight overhand knot holds.
 //!
-//! Each place is found where the distance to the other strand is exactly 1.2 diameters, between particles too, and measured in rest
-//! arc length. So it moves continuously while the thread does, and stays when the whole knot moves.
+//! Each place is found where the distance to the other strand is exactly 1.2 diameters, between particles too, and
+//! measured in rest arc length. So it moves continuously while the thread does, and stays when the whole knot moves.
 
 use super::space::{Aabb, BoxTree};
 use glam::DVec3;
@@ -34,8 +35,8 @@ impl Entries {
     }
 }
 
-/// Where the thread through `points` with these rest lengths of its elements and this radius enters its knot. `None` when it
-/// touches itself nowhere, or when the input does not fit together.
+/// Where the thread through `points` with these rest lengths of its elements and this radius enters its knot. `None`
+/// when it touches itself nowhere, or when the input does not fit together.
 pub fn entries(points: &[DVec3], rest_lengths: &[f64], radius: f64) -> Option<Entries> {
     let fits = points.len() == rest_lengths.len() + 1
         && radius.is_finite()
@@ -99,7 +100,9 @@ impl<'a> Thread<'a> {
         let mut best: Option<(f64, f64)> = None;
         self.tree.any(&Aabb::around(&[p]).grown(self.reach), &mut |f| {
             // Only the pieces of the element that are far enough along the thread.
-            for (from, to) in [(self.arc[f], self.arc[f + 1].min(s - apart)), (self.arc[f].max(s + apart), self.arc[f + 1])] {
+            for (from, to) in
+                [(self.arc[f], self.arc[f + 1].min(s - apart)), (self.arc[f].max(s + apart), self.arc[f + 1])]
+            {
                 if from < to {
                     let (a, b) = (self.point(f, from), self.point(f, to));
                     let u = ((p - a).dot(b - a) / (b - a).length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -178,7 +181,8 @@ fn largest_group(thread: &Thread<'_>, stretches: &[Stretch]) -> Option<Vec<Stret
             }
         }
     }
-    let length = |g: usize| stretches.iter().zip(&group).filter(|(_, k)| **k == g).map(|(s, _)| s.to - s.from).sum::<f64>();
+    let length =
+        |g: usize| stretches.iter().zip(&group).filter(|(_, k)| **k == g).map(|(s, _)| s.to - s.from).sum::<f64>();
     // Of equal ones the first.
     let largest = (0..stretches.len()).rev().max_by(|a, b| length(*a).total_cmp(&length(*b)))?;
     Some(stretches.iter().zip(&group).filter(|(_, g)| **g == largest).map(|(s, _)| s.clone()).collect())

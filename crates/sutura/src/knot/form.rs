@@ -1,17 +1,17 @@
 //! Whether a knot lies flat or has capsized, which topology does not tell.
 //!
-//! Two strands make a knot: the two passes of a thread through it, or one of each of two threads. In a flat knot each bends round the
-//! other, and both turn alike. When it capsizes (a reef knot spilled into a lark's head, a granny into two half hitches) one strand goes
-//! nearly straight through and the other winds about it. So the measure is how evenly the turning is shared: with the total curvature
-//! of the strands `K1` and `K2` \[rad\],
+//! Two strands make a knot: the two passes of a thread through it, or one of each of two threads. In a flat knot each
+//! bends round the other, and both turn alike. When it capsizes (a reef knot spilled into a lark's head, a granny into
+//! two half hitches) one strand goes nearly straight through and the other winds about it. So the measure is how evenly
+//! the turning is shared: with the total curvature of the strands `K1` and `K2` \[rad\],
 //!
 //! `share = 2 min(K1, K2) / (K1 + K2)`,
 //!
-//! 1 when both turn alike, 0 when one is straight. It has no length in it, and is the same for the mirror image, for the thread read
-//! backward, and for any motion of the whole (theory 15).
+//! 1 when both turn alike, 0 when one is straight. It has no length in it, and is the same for the mirror image, for
+//! the thread read backward, and for any motion of the whole (theory 15).
 //!
-//! Curvature is taken from chords of one thread radius of arc: shorter waves are those of a table's digits or of a solver at rest, not
-//! the thread's.
+//! Curvature is taken from chords of one thread radius of arc: shorter waves are those of a table's digits or of a
+//! solver at rest, not the thread's.
 
 use super::space::{Aabb, BoxTree, point_segment};
 use super::{Entries, entries};
@@ -59,20 +59,22 @@ impl Verdict {
 const FLAT: f64 = 0.8;
 /// Share to which it is capsized: one strand turns at least three times as much as the other.
 const CAPSIZED: f64 = 0.5;
-/// Turning of both strands together under which there is nothing to share \[rad\]: two strands that lie side by side are no knot. A
-/// flat throw has a quarter of a turn in each strand at least.
+/// Turning of both strands together under which there is nothing to share \[rad\]: two strands that lie side by side
+/// are no knot. A flat throw has a quarter of a turn in each strand at least.
 const LEAST_TURNING: f64 = core::f64::consts::PI;
 
-/// How the knot of a thread with a loop lies. `None` when it touches itself nowhere, has no loop ([`Entries::loop_ab`]), or when the
-/// input does not fit together.
+/// How the knot of a thread with a loop lies. `None` when it touches itself nowhere, has no loop
+/// ([`Entries::loop_ab`]), or when the input does not fit together.
 pub fn form(points: &[DVec3], rest_lengths: &[f64], radius: f64) -> Option<Form> {
-    let Entries { tail_a, loop_ab: Some([loop_a, loop_b]), tail_b } = entries(points, rest_lengths, radius)? else { return None };
+    let Entries { tail_a, loop_ab: Some([loop_a, loop_b]), tail_b } = entries(points, rest_lengths, radius)? else {
+        return None;
+    };
     let strand = |from: f64, to: f64| between(points, rest_lengths, from, to);
     form_of_strands([&strand(tail_a, loop_a), &strand(loop_b, tail_b)], radius)
 }
 
-/// How the knot that joins two threads of this radius lies: a strand is the part of a thread from the first to the last place that is
-/// nearer than 1.2 diameters to the other thread. `None` when they do not touch.
+/// How the knot that joins two threads of this radius lies: a strand is the part of a thread from the first to the last
+/// place that is nearer than 1.2 diameters to the other thread. `None` when they do not touch.
 pub fn form_of_two(a: &[DVec3], b: &[DVec3], radius: f64) -> Option<Form> {
     if !(radius.is_finite() && radius > 0.0) || a.iter().chain(b).any(|p| !p.is_finite()) {
         return None;
@@ -81,8 +83,8 @@ pub fn form_of_two(a: &[DVec3], b: &[DVec3], radius: f64) -> Option<Form> {
     form_of_strands([&near(&even(a, radius), b, reach), &near(&even(b, radius), a, reach)], radius)
 }
 
-/// How two strands lie that make a knot, given from where they enter it to where they leave it. `None` when they do not turn, or when
-/// the input does not fit together.
+/// How two strands lie that make a knot, given from where they enter it to where they leave it. `None` when they do not
+/// turn, or when the input does not fit together.
 pub fn form_of_strands(strands: [&[DVec3]; 2], radius: f64) -> Option<Form> {
     let finite = strands.iter().all(|s| s.iter().all(|p| p.is_finite()));
     if !(finite && radius.is_finite() && radius > 0.0) {
@@ -155,7 +157,9 @@ fn near(points: &[DVec3], polyline: &[DVec3], reach: f64) -> Vec<DVec3> {
         tree.set(k, Aabb::around(w));
     }
     tree.refit();
-    let touches = |p: &DVec3| tree.any(&Aabb::around(&[*p]).grown(reach), &mut |k| point_segment(*p, [polyline[k], polyline[k + 1]]) < reach);
+    let touches = |p: &DVec3| {
+        tree.any(&Aabb::around(&[*p]).grown(reach), &mut |k| point_segment(*p, [polyline[k], polyline[k + 1]]) < reach)
+    };
     match (points.iter().position(touches), points.iter().rposition(touches)) {
         (Some(first), Some(last)) => points[first..=last].to_vec(),
         _ => Vec::new(),

@@ -1,5 +1,5 @@
-//! Gauss integrals of polygons, exact but for round-off: each pair of straight segments contributes the signed solid angle under
-//! which the one sees the other (Klenin and Langowski 2000).
+//! Gauss integrals of polygons, exact but for round-off: each pair of straight segments contributes the signed solid
+//! angle under which the one sees the other (Klenin and Langowski 2000).
 
 use glam::DVec3;
 
@@ -23,8 +23,9 @@ fn solid_angle(p1: DVec3, p2: DVec3, p3: DVec3, p4: DVec3) -> f64 {
     }
 }
 
-/// Writhe of a polyline in turns: the mean over all views of the signed crossings. Positive for right-handed ones. With `closed` the
-/// last point is joined to the first, and twist + writhe changes only where the thread passes through itself (by 2).
+/// Writhe of a polyline in turns: the mean over all views of the signed crossings. Positive for right-handed ones. With
+/// `closed` the last point is joined to the first, and twist + writhe changes only where the thread passes through
+/// itself (by 2).
 pub fn writhe(points: &[DVec3], closed: bool) -> f64 {
     let n = points.len();
     let n_edges = if closed { n } else { n.saturating_sub(1) };
@@ -40,7 +41,8 @@ pub fn writhe(points: &[DVec3], closed: bool) -> f64 {
     sum / core::f64::consts::TAU
 }
 
-/// Linking number of two closed polygons (the last point is joined to the first): an integer up to round-off when they do not touch.
+/// Linking number of two closed polygons (the last point is joined to the first): an integer up to round-off when they
+/// do not touch.
 pub fn gauss_linking(a: &[DVec3], b: &[DVec3]) -> f64 {
     let mut sum = 0.0;
     for i in 0..a.len() {

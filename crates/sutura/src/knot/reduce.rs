@@ -1,7 +1,8 @@
-//! Fewer points, same knot: a corner `abc` is cut to `ac` when nothing is in or near the triangle between them (Koniaris and
-//! Muthukumar 1991; Taylor 2000). That is an isotopy of the polygon, so the knot type cannot change. Exact predicates would not be enough:
-//! they allow a cut that ends within round-off of another strand, and the next rotation of all points then passes it through. So a cut
-//! keeps a margin, a million times the round-off, and in doubt is not made.
+//! Fewer points, same knot: a corner `abc` is cut to `ac` when nothing is in or near the triangle between them
+//! (Koniaris and Muthukumar 1991; Taylor 2000). That is an isotopy of the polygon, so the knot type cannot change.
+//! Exact predicates would not be enough: they allow a cut that ends within round-off of another strand, and the next
+//! rotation of all points then passes it through. So a cut keeps a margin, a million times the round-off, and in doubt
+//! is not made.
 
 use super::space::{Aabb, BoxTree, segment_triangle, segments};
 use glam::DVec3;
@@ -14,7 +15,8 @@ fn near(triangle: [DVec3; 3], p: DVec3, q: DVec3) -> bool {
     let [a, b, c] = triangle;
     let (u, v) = (b - a, c - a);
     let normal = u.cross(v);
-    // Clear of the plane by the margin and by the round-off of the product, both ends on one side: the most common case.
+    // Clear of the plane by the margin and by the round-off of the product, both ends on one side: the most common
+    // case.
     let (clear, round_off) = (2.0 * MARGIN * normal.length(), 16.0 * f64::EPSILON * u.length() * v.length());
     let side = |x: DVec3| {
         let (w, volume) = (x - a, (x - a).dot(normal));
@@ -24,8 +26,8 @@ fn near(triangle: [DVec3; 3], p: DVec3, q: DVec3) -> bool {
     !one_side && segment_triangle([p, q], triangle) <= MARGIN
 }
 
-/// The same for a segment from the corner `shared` of the triangle to `p`, where `opposite` is the other edge: it may only leave. If it
-/// went into the triangle it would end there or go out through that edge.
+/// The same for a segment from the corner `shared` of the triangle to `p`, where `opposite` is the other edge: it may
+/// only leave. If it went into the triangle it would end there or go out through that edge.
 fn near_from(triangle: [DVec3; 3], shared: DVec3, opposite: [DVec3; 2], p: DVec3) -> bool {
     segment_triangle([p, p], triangle) <= MARGIN || segments([shared, p], opposite) <= MARGIN
 }
@@ -50,8 +52,8 @@ fn near_apart_from_corners(triangle: [DVec3; 3], p: DVec3, q: DVec3) -> bool {
     }
 }
 
-/// Takes out every point that can go, pass after pass, every second one at a time so that the edges grow evenly. `obstacles` are
-/// segments that may not be crossed either. The ends of an open chain stay.
+/// Takes out every point that can go, pass after pass, every second one at a time so that the edges grow evenly.
+/// `obstacles` are segments that may not be crossed either. The ends of an open chain stay.
 pub(super) fn reduce(points: &mut Vec<DVec3>, closed: bool, obstacles: &[[DVec3; 2]]) {
     let n = points.len();
     if n < 4 {
@@ -91,7 +93,10 @@ pub(super) fn reduce(points: &mut Vec<DVec3>, closed: bool, obstacles: &[[DVec3;
                 } else {
                     near(triangle, points[p], points[q])
                 }
-            }) || obstacles.iter().zip(&obstacle_boxes).any(|(o, ob)| ob.overlaps(&around) && near_apart_from_corners(triangle, o[0], o[1]));
+            }) || obstacles
+                .iter()
+                .zip(&obstacle_boxes)
+                .any(|(o, ob)| ob.overlaps(&around) && near_apart_from_corners(triangle, o[0], o[1]));
             if !blocked {
                 next[a] = c;
                 prev[c] = a;
@@ -149,7 +154,8 @@ mod tests {
         assert!(free.len() <= 3, "{} points left", free.len());
         assert_eq!((free[0], *free.last().unwrap()), (wavy[0], wavy[199]));
         // A half circle about a needle cannot be drawn straight past it.
-        let mut arc: Vec<DVec3> = (0..50).map(|i| libm::sincos(f64::from(i) * 0.06)).map(|(s, c)| DVec3::new(c, s, 0.001 * c * s)).collect();
+        let mut arc: Vec<DVec3> =
+            (0..50).map(|i| libm::sincos(f64::from(i) * 0.06)).map(|(s, c)| DVec3::new(c, s, 0.001 * c * s)).collect();
         reduce(&mut arc, false, &[[DVec3::new(0.1, 0.5, -1.0), DVec3::new(0.1, 0.5, 1.0)]]);
         assert!(arc.len() >= 3);
     }

@@ -1,6 +1,7 @@
-//! What recognition and audit need of space: distances of segments and triangles, and a tree of boxes over things kept in the order of
-//! a thread. Neighbors along a thread are neighbors in space, so the order itself is the hierarchy: nothing is sorted, a refit is one
-//! pass, and one thing can change in the time of one path to the root. Not shared with the contact code, which the audit checks.
+//! What recognition and audit need of space: distances of segments and triangles, and a tree of boxes over things kept
+//! in the order of a thread. Neighbors along a thread are neighbors in space, so the order itself is the hierarchy:
+//! nothing is sorted, a refit is one pass, and one thing can change in the time of one path to the root. Not shared
+//! with the contact code, which the audit checks.
 
 use glam::DVec3;
 

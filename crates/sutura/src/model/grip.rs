@@ -34,8 +34,8 @@ pub enum Place {
 pub enum Hold {
     /// The position of one particle; it may turn.
     Pin,
-    /// One particle and the cross-section there. It acts over half an element on each side (compliance of half a joint), which
-    /// keeps the solution second order in the element length.
+    /// One particle and the cross-section there. It acts over half an element on each side (compliance of half a
+    /// joint), which keeps the solution second order in the element length.
     Clamp,
     /// A whole element: its two particles and its frame, as between the jaws of an instrument.
     Jaw,
@@ -44,11 +44,12 @@ pub enum Hold {
 /// What moves a grip.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
-    /// A pose set by the user ([`World::set_grip_pose`](crate::World::set_grip_pose)); where it is when taken, until then.
+    /// A pose set by the user ([`World::set_grip_pose`](crate::World::set_grip_pose)); where it is when taken, until
+    /// then.
     Pose,
-    /// A force along a line through where it is, with a speed limit: the grip acts with `force * (1 - speed / speed_limit)` along
-    /// `direction`, so it moves at `speed_limit` where nothing resists and rests where the thread pulls back with `force`.
-    /// It does not move across `direction`; a clamp or jaw does not turn.
+    /// A force along a line through where it is, with a speed limit: the grip acts with `force * (1 - speed /
+    /// speed_limit)` along `direction`, so it moves at `speed_limit` where nothing resists and rests where the thread
+    /// pulls back with `force`. It does not move across `direction`; a clamp or jaw does not turn.
     Force {
         /// Direction of the force in the world, a unit vector.
         direction: DVec3,
@@ -57,8 +58,9 @@ pub enum Drive {
         /// Speed where nothing resists \[m/s\], > 0.
         speed_limit: f64,
     },
-    /// The same, but it gives way across `direction` too: the grip acts with `force * (direction - velocity / speed_limit)`. So what holds
-    /// it back from wherever, it rests or gives way with no more than `force`; a clamp or jaw does not turn.
+    /// The same, but it gives way across `direction` too: the grip acts with `force * (direction - velocity /
+    /// speed_limit)`. So what holds it back from wherever, it rests or gives way with no more than `force`; a clamp or
+    /// jaw does not turn.
     Hand {
         /// Direction of the force in the world, a unit vector.
         direction: DVec3,
@@ -80,8 +82,8 @@ pub struct GripSpec {
     pub hold: Hold,
     /// What moves it.
     pub drive: Drive,
-    /// Time over which it takes hold \[s\], >= 0: the held piece passes smoothly from its own motion to the grip's. Where the first
-    /// pose set differs from the piece's pose, the difference is closed over this time too.
+    /// Time over which it takes hold \[s\], >= 0: the held piece passes smoothly from its own motion to the grip's.
+    /// Where the first pose set differs from the piece's pose, the difference is closed over this time too.
     pub ramp: f64,
 }
 
@@ -155,7 +157,9 @@ impl LoadKind {
         }
     }
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        let finite = |field: &str, v: DVec3| if v.is_finite() { Ok(()) } else { Err(Error::invalid("load", field, v, "a finite vector")) };
+        let finite = |field: &str, v: DVec3| {
+            if v.is_finite() { Ok(()) } else { Err(Error::invalid("load", field, v, "a finite vector")) }
+        };
         match self {
             LoadKind::Point { force, torque, .. } => {
                 finite("force", *force)?;
@@ -164,7 +168,13 @@ impl LoadKind {
             LoadKind::Uniform { force_per_length } => finite("force_per_length", *force_per_length),
             LoadKind::Mass { mass, inertia, .. } => {
                 check("load", "mass", *mass, *mass >= 0.0, "a finite mass >= 0 [kg]")?;
-                check("load", "inertia", inertia.min_element(), inertia.is_finite() && inertia.min_element() >= 0.0, "finite moments >= 0 [kg m^2]")
+                check(
+                    "load",
+                    "inertia",
+                    inertia.min_element(),
+                    inertia.is_finite() && inertia.min_element() >= 0.0,
+                    "finite moments >= 0 [kg m^2]",
+                )
             }
         }
     }
@@ -205,7 +215,13 @@ impl Place {
             Place::Element(e) if e < rod.n_elements => Ok(()),
             Place::Arc(s) => {
                 let length: f64 = rod.elements().map(|e| model.rest_length[e]).sum();
-                check(what, "place.arc", s, s >= 0.0 && s <= length * (1.0 + 1e-9), "a rest arc length within the thread [m]")
+                check(
+                    what,
+                    "place.arc",
+                    s,
+                    s >= 0.0 && s <= length * (1.0 + 1e-9),
+                    "a rest arc length within the thread [m]",
+                )
             }
             Place::Particle(i) => Err(Error::invalid(what, "place.particle", i, "at most the number of elements")),
             Place::Element(e) => Err(Error::invalid(what, "place.element", e, "under the number of elements")),

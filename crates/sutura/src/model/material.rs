@@ -13,10 +13,11 @@ pub struct Material {
     pub shear: Shear,
     /// Mass per volume \[kg/m^3\], > 0.
     pub density: f64,
-    /// Bending and twisting stiffness over that of a solid round rod of modulus E, in (0, 1]. 1 is a monofilament; a braid is
-    /// much softer in bending than `E I`.
+    /// Bending and twisting stiffness over that of a solid round rod of modulus E, in (0, 1]. 1 is a monofilament; a
+    /// braid is much softer in bending than `E I`.
     pub bend_scale: f64,
-    /// Relaxation time tau of Kelvin-Voigt damping in bending and twist \[s\], >= 0: moment = stiffness * (strain + tau * strain rate).
+    /// Relaxation time tau of Kelvin-Voigt damping in bending and twist \[s\], >= 0: moment = stiffness * (strain + tau
+    /// * strain rate).
     pub bend_damping: f64,
     /// Plastic set in bending and twist; `None` is purely elastic.
     pub plasticity: Option<Plasticity>,
@@ -45,7 +46,14 @@ pub struct Plasticity {
 impl Material {
     /// A purely elastic solid round material with Poisson's ratio 0.4, no damping.
     pub fn elastic(young_modulus: f64, density: f64) -> Self {
-        Material { young_modulus, shear: Shear::Poisson(0.4), density, bend_scale: 1.0, bend_damping: 0.0, plasticity: None }
+        Material {
+            young_modulus,
+            shear: Shear::Poisson(0.4),
+            density,
+            bend_scale: 1.0,
+            bend_damping: 0.0,
+            plasticity: None,
+        }
     }
 
     /// Shear modulus G \[Pa\].
@@ -56,7 +64,8 @@ impl Material {
         }
     }
 
-    /// Plane-strain modulus of Hertz contact, E / (1 - nu^2) \[Pa\]. Where the shear modulus is given, which of a braid says nothing about nu, nu is 0.4.
+    /// Plane-strain modulus of Hertz contact, E / (1 - nu^2) \[Pa\]. Where the shear modulus is given, which of a braid
+    /// says nothing about nu, nu is 0.4.
     pub(crate) fn contact_modulus(&self) -> f64 {
         let nu = match self.shear {
             Shear::Poisson(nu) => nu,
@@ -73,7 +82,13 @@ impl Material {
             Shear::Modulus(g) => check(what, "shear_modulus", g, g > 0.0, "a finite number > 0 [Pa]")?,
         }
         check(what, "density", self.density, self.density > 0.0, "a finite number > 0 [kg/m^3]")?;
-        check(what, "bend_scale", self.bend_scale, self.bend_scale > 0.0 && self.bend_scale <= 1.0, "a number in (0, 1]")?;
+        check(
+            what,
+            "bend_scale",
+            self.bend_scale,
+            self.bend_scale > 0.0 && self.bend_scale <= 1.0,
+            "a number in (0, 1]",
+        )?;
         check(what, "bend_damping", self.bend_damping, self.bend_damping >= 0.0, "a finite time >= 0 [s]")?;
         if let Some(p) = &self.plasticity {
             check(what, "yield_curvature", p.yield_curvature, p.yield_curvature > 0.0, "a finite number > 0 [1/m]")?;
@@ -125,8 +140,19 @@ mod tests {
     #[test]
     fn section_of_the_2_0_monofilament() {
         // Reference set T1: d = 0.30 mm, E = 2 GPa, nu = 0.4, rho = 1150.
-        let s = SectionStiffness::new(&Material::elastic(2.0e9, 1150.0), &Section::Round, 0.15e-3, Along::default().at(0.0));
-        for (got, want) in [(s.ea, 141.372), (s.bend.x, 7.95216e-7), (s.bend.y, s.bend.x), (s.bend.z, 5.68011e-7), (s.mass, 8.12887e-5)] {
+        let s = SectionStiffness::new(
+            &Material::elastic(2.0e9, 1150.0),
+            &Section::Round,
+            0.15e-3,
+            Along::default().at(0.0),
+        );
+        for (got, want) in [
+            (s.ea, 141.372),
+            (s.bend.x, 7.95216e-7),
+            (s.bend.y, s.bend.x),
+            (s.bend.z, 5.68011e-7),
+            (s.mass, 8.12887e-5),
+        ] {
             assert!((got / want - 1.0).abs() < 1e-5, "{got} {want}");
         }
     }

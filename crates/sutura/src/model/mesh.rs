@@ -1,5 +1,5 @@
-//! Triangle meshes as they come out of files: checked when they are inserted, mended where there is only one way to, refused with the place
-//! where there is not.
+//! Triangle meshes as they come out of files: checked when they are inserted, mended where there is only one way to,
+//! refused with the place where there is not.
 //!
 //! | what is found | what is done |
 //! |---|---|
@@ -12,8 +12,9 @@
 //! | a component that would be closed but for small holes | refused, unless it is said to be open |
 //! | any other with an edge | a sheet, met from both sides; where its largest hole is, is said |
 //!
-//! A hole is small where it is one missing triangle, or has less than [`SMALL_HOLE`] of the area of its component: a crack, a missing cap, a slip of the
-//! modeler. So a tube longer than some 13 diameters with both ends open has to be said to be open.
+//! A hole is small where it is one missing triangle, or has less than [`SMALL_HOLE`] of the area of its component: a
+//! crack, a missing cap, a slip of the modeler. So a tube longer than some 13 diameters with both ends open has to be
+//! said to be open.
 //!
 //! Not looked at: whether triangles pass through each other.
 
@@ -97,15 +98,25 @@ pub(crate) fn check(vertices: &[DVec3], triangles: &[[u32; 3]], open: bool) -> R
     doubled.extend(twice(&mut faces));
     slivers(vertices, &mut faces, &mut notes)?;
     if let Some((first, again)) = doubled.first() {
-        notes.push(format!("left out {} given twice, the first triangle {again}, the same as {first}", count(doubled.len(), "triangle")));
+        notes.push(format!(
+            "left out {} given twice, the first triangle {again}, the same as {first}",
+            count(doubled.len(), "triangle")
+        ));
     }
     if let Some(v) = joined.first() {
         let place = coordinates(vertices[*v as usize]);
-        notes.push(format!("joined {} with others at the same place, the first vertex {v} at {place}", count(joined.len(), "vertex")));
+        notes.push(format!(
+            "joined {} with others at the same place, the first vertex {v} at {place}",
+            count(joined.len(), "vertex")
+        ));
     }
     if faces.is_empty() {
         let t = triangles[0];
-        return Err(invalid("triangles[0]", format!("{t:?} at {}", at_corners(vertices, t)), "a triangle with an area"));
+        return Err(invalid(
+            "triangles[0]",
+            format!("{t:?} at {}", at_corners(vertices, t)),
+            "a triangle with an area",
+        ));
     }
     let sides = sides(&faces);
     if let Some(crowd) = sides.chunk_by(|a, b| a.edge == b.edge).find(|c| c.len() > 2) {
@@ -114,7 +125,13 @@ pub(crate) fn check(vertices: &[DVec3], triangles: &[[u32; 3]], open: bool) -> R
     let component = orient(vertices, &mut faces, &sides, &mut notes)?;
     let closed = openings(vertices, &faces, &component, open, &mut notes)?;
     let container = containers(vertices, &faces, &component, &closed, &mut notes);
-    Ok(CheckedMesh { vertices: vertices.to_vec(), triangles: faces.iter().map(|f| f.corners).collect(), closed: closed.iter().all(|c| *c), container, notes })
+    Ok(CheckedMesh {
+        vertices: vertices.to_vec(),
+        triangles: faces.iter().map(|f| f.corners).collect(),
+        closed: closed.iter().all(|c| *c),
+        container,
+        notes,
+    })
 }
 
 fn invalid(field: impl Into<String>, value: impl Into<String>, wanted: &'static str) -> Error {
@@ -136,7 +153,11 @@ fn at_corners(vertices: &[DVec3], t: [u32; 3]) -> String {
 /// Whether all numbers are usable.
 fn numbers(vertices: &[DVec3], triangles: &[[u32; 3]]) -> Result<Vec<Face>, Error> {
     if let Some(i) = vertices.iter().position(|v| !crate::math::is_place(*v)) {
-        return Err(invalid(format!("vertices[{i}]"), format!("{:?}", vertices[i]), "finite coordinates whose squares are finite too [m]"));
+        return Err(invalid(
+            format!("vertices[{i}]"),
+            format!("{:?}", vertices[i]),
+            "finite coordinates whose squares are finite too [m]",
+        ));
     }
     if triangles.is_empty() {
         return Err(invalid("triangles", "none", "at least one triangle"));
@@ -153,7 +174,10 @@ fn collapsed(vertices: &[DVec3], faces: &mut Vec<Face>, notes: &mut Vec<String>)
     let gone: Vec<u32> = faces.iter().filter(|f| flat(f)).map(|f| f.number).collect();
     faces.retain(|f| !flat(f));
     if let Some(first) = gone.first() {
-        notes.push(format!("left out {} with two corners at one place, the first triangle {first}", count(gone.len(), "triangle")));
+        notes.push(format!(
+            "left out {} with two corners at one place, the first triangle {first}",
+            count(gone.len(), "triangle")
+        ));
     }
 }
 
@@ -180,11 +204,15 @@ fn twice(faces: &mut Vec<Face>) -> Vec<(u32, u32)> {
     again
 }
 
-/// Joins vertices at the very same place where the surface ends at both: the corners of loose triangles, the seams of textures. What touches elsewhere stays
-/// apart. The vertices that gave way.
+/// Joins vertices at the very same place where the surface ends at both: the corners of loose triangles, the seams of
+/// textures. What touches elsewhere stays apart. The vertices that gave way.
 fn join_seams(vertices: &[DVec3], faces: &mut [Face]) -> Vec<u32> {
     let sides = sides(faces);
-    let mut ends: Vec<u32> = sides.chunk_by(|a, b| a.edge == b.edge).filter(|c| c.len() == 1).flat_map(|c| [c[0].edge.0, c[0].edge.1]).collect();
+    let mut ends: Vec<u32> = sides
+        .chunk_by(|a, b| a.edge == b.edge)
+        .filter(|c| c.len() == 1)
+        .flat_map(|c| [c[0].edge.0, c[0].edge.1])
+        .collect();
     // Zero and minus zero are one place.
     let key = |v: u32| (vertices[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
     ends.sort_unstable_by_key(|v| (key(*v), *v));
@@ -201,8 +229,8 @@ fn join_seams(vertices: &[DVec3], faces: &mut [Face]) -> Vec<u32> {
     becomes.into_keys().collect()
 }
 
-/// Takes triangles whose corners lie on one line out of the mesh, so that no crack stays: the neighbor beyond the longest side is cut at the corner
-/// that lies on it.
+/// Takes triangles whose corners lie on one line out of the mesh, so that no crack stays: the neighbor beyond the
+/// longest side is cut at the corner that lies on it.
 fn slivers(vertices: &[DVec3], faces: &mut Vec<Face>, notes: &mut Vec<String>) -> Result<(), Error> {
     let flat = |f: &Face| {
         let [a, b, c] = f.corners.map(|c| vertices[c as usize]);
@@ -226,16 +254,22 @@ fn slivers(vertices: &[DVec3], faces: &mut Vec<Face>, notes: &mut Vec<String>) -
             continue;
         }
         steps = steps.checked_sub(1).ok_or_else(|| {
-            invalid(format!("triangles[{}]", face.number), format!("{:?} at {}", face.corners, at_corners(vertices, face.corners)), "a triangle with an area")
+            invalid(
+                format!("triangles[{}]", face.number),
+                format!("{:?} at {}", face.corners, at_corners(vertices, face.corners)),
+                "a triangle with an area",
+            )
         })?;
         let longest = |(a, b, _): &(u32, u32, u32)| (vertices[*a as usize] - vertices[*b as usize]).length_squared();
-        let (a, c, middle) = face.edges().into_iter().max_by(|x, y| longest(x).total_cmp(&longest(y))).expect("three edges");
+        let (a, c, middle) =
+            face.edges().into_iter().max_by(|x, y| longest(x).total_cmp(&longest(y))).expect("three edges");
         gone[i] = true;
         for (a, b, _) in face.edges() {
             at.entry(key(a, b)).or_default().retain(|k| *k != i);
         }
         let Some(other) = at.get(&key(a, c)).and_then(|o| o.first().copied()) else { continue };
-        let (from, to, opposite) = faces[other].edges().into_iter().find(|(x, y, _)| key(*x, *y) == key(a, c)).expect("it is at this edge");
+        let (from, to, opposite) =
+            faces[other].edges().into_iter().find(|(x, y, _)| key(*x, *y) == key(a, c)).expect("it is at this edge");
         for (a, b, _) in faces[other].edges() {
             at.entry(key(a, b)).or_default().retain(|k| *k != other);
         }
@@ -258,7 +292,11 @@ fn slivers(vertices: &[DVec3], faces: &mut Vec<Face>, notes: &mut Vec<String>) -
 fn sides(faces: &[Face]) -> Vec<Side> {
     let mut sides: Vec<Side> = Vec::with_capacity(3 * faces.len());
     for (i, face) in faces.iter().enumerate() {
-        sides.extend(face.edges().map(|(a, b, _)| Side { edge: (a.min(b), a.max(b)), face: i as u32, ascending: a < b }));
+        sides.extend(face.edges().map(|(a, b, _)| Side {
+            edge: (a.min(b), a.max(b)),
+            face: i as u32,
+            ascending: a < b,
+        }));
     }
     sides.sort_unstable();
     sides
@@ -267,13 +305,22 @@ fn sides(faces: &[Face]) -> Vec<Side> {
 fn crowded(vertices: &[DVec3], faces: &[Face], crowd: &[Side]) -> Error {
     let numbers: Vec<String> = crowd.iter().map(|s| faces[s.face as usize].number.to_string()).collect();
     let (a, b) = crowd[0].edge;
-    let edge = format!("vertices {a} and {b}, from {} to {}", coordinates(vertices[a as usize]), coordinates(vertices[b as usize]));
+    let edge = format!(
+        "vertices {a} and {b}, from {} to {}",
+        coordinates(vertices[a as usize]),
+        coordinates(vertices[b as usize])
+    );
     let value = format!("one of {} triangles ({}) at the edge of {edge}", crowd.len(), numbers.join(", "));
     invalid(format!("triangles[{}]", numbers[0]), value, "at most two triangles at an edge")
 }
 
 /// Turns triangles so that neighbors agree; the component of each, numbered from zero.
-fn orient(vertices: &[DVec3], faces: &mut [Face], sides: &[Side], notes: &mut Vec<String>) -> Result<Vec<usize>, Error> {
+fn orient(
+    vertices: &[DVec3],
+    faces: &mut [Face],
+    sides: &[Side],
+    notes: &mut Vec<String>,
+) -> Result<Vec<usize>, Error> {
     let mut next: Vec<Vec<Neighbor>> = vec![Vec::new(); faces.len()];
     for pair in sides.chunk_by(|a, b| a.edge == b.edge).filter(|c| c.len() == 2) {
         let against = pair[0].ascending == pair[1].ascending;
@@ -299,7 +346,10 @@ fn orient(vertices: &[DVec3], faces: &mut [Face], sides: &[Side], notes: &mut Ve
                     stack.push(*k);
                 } else if turned[*k] != turned[i] ^ against {
                     let place = [edge.0, edge.1].map(|v| coordinates(vertices[v as usize])).join(" to ");
-                    let value = format!("of a surface with one side: triangles {} and {} meet at the edge from {place}", faces[i].number, faces[*k].number);
+                    let value = format!(
+                        "of a surface with one side: triangles {} and {} meet at the edge from {place}",
+                        faces[i].number, faces[*k].number
+                    );
                     return Err(invalid(format!("triangles[{}]", faces[i].number), value, "a surface with two sides"));
                 }
             }
@@ -316,13 +366,24 @@ fn orient(vertices: &[DVec3], faces: &mut [Face], sides: &[Side], notes: &mut Ve
     }
     if let Some(first) = all.first() {
         let place = at_corners(vertices, faces[*first].corners);
-        notes.push(format!("turned {} facing against the neighbors, the first triangle {} at {place}", count(all.len(), "triangle"), faces[*first].number));
+        notes.push(format!(
+            "turned {} facing against the neighbors, the first triangle {} at {place}",
+            count(all.len(), "triangle"),
+            faces[*first].number
+        ));
     }
     Ok(component)
 }
 
-/// The holes of each component; whether each is closed. Those that a component would be closed without are refused, unless it is `open`.
-fn openings(vertices: &[DVec3], faces: &[Face], component: &[usize], open: bool, notes: &mut Vec<String>) -> Result<Vec<bool>, Error> {
+/// The holes of each component; whether each is closed. Those that a component would be closed without are refused,
+/// unless it is `open`.
+fn openings(
+    vertices: &[DVec3],
+    faces: &[Face],
+    component: &[usize],
+    open: bool,
+    notes: &mut Vec<String>,
+) -> Result<Vec<bool>, Error> {
     let n = component.iter().max().map_or(0, |c| c + 1);
     let mut area = vec![0.0; n];
     for (f, c) in faces.iter().zip(component) {
@@ -342,12 +403,20 @@ fn openings(vertices: &[DVec3], faces: &[Face], component: &[usize], open: bool,
         holes.sort_by(|a, b| b.area.total_cmp(&a.area));
         let small = |h: &Hole| h.area < SMALL_HOLE * area[c] || h.corners == 3 && h.area < 0.5 * area[c];
         let largest = &holes[0];
-        let place = format!("at {}, {} edges around it, {:.2e} m across", coordinates(largest.middle), largest.corners, largest.across);
+        let place = format!(
+            "at {}, {} edges around it, {:.2e} m across",
+            coordinates(largest.middle),
+            largest.corners,
+            largest.across
+        );
         if !open && holes.iter().all(small) {
             let value = format!("closed but for {}, the largest {place}", count(holes.len(), "small hole"));
             return Err(invalid("mesh", value, "a closed mesh, or one that is said to be open"));
         }
-        notes.push(format!("the mesh is open, so threads meet it from both sides: {}, the largest {place}", count(holes.len(), "hole")));
+        notes.push(format!(
+            "the mesh is open, so threads meet it from both sides: {}, the largest {place}",
+            count(holes.len(), "hole")
+        ));
     }
     Ok(closed)
 }
@@ -388,7 +457,13 @@ impl Hole {
 }
 
 /// Says which closed components are containers: turned inside out, and in no other. Whether there are any.
-fn containers(vertices: &[DVec3], faces: &[Face], component: &[usize], closed: &[bool], notes: &mut Vec<String>) -> bool {
+fn containers(
+    vertices: &[DVec3],
+    faces: &[Face],
+    component: &[usize],
+    closed: &[bool],
+    notes: &mut Vec<String>,
+) -> bool {
     let mut any = false;
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); closed.len()];
     component.iter().enumerate().for_each(|(i, c)| members[*c].push(i));

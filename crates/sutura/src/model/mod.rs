@@ -20,12 +20,12 @@ use section::Factors;
 use shape::{Geometry, ShapeMotion};
 use weld::WeldModel;
 
-/// Axial stiffness of an inextensible element over that of its material: under half of E A, more than any thread bears, it is longer by
-/// 5e-6. Stiffer, tension would lose digits to the rounding of positions.
+/// Axial stiffness of an inextensible element over that of its material: under half of E A, more than any thread bears,
+/// it is longer by 5e-6. Stiffer, tension would lose digits to the rounding of positions.
 const INEXTENSIBLE: f64 = 1e5;
 
-/// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last element entry
-/// of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
+/// All rods lie one after the other in these arrays, `n + 1` entries a rod for particles and for elements too: the last
+/// element entry of a rod is unused, so that element `e` joins particles `e` and `e + 1` and has frame `e`.
 #[derive(Default)]
 pub struct Model {
     pub(crate) settings: Settings,
@@ -54,11 +54,13 @@ pub struct Model {
     pub(crate) section: Vec<SectionStiffness>,
     /// Moments of inertia of each frame along its directors, attached ones included \[kg m^2\].
     pub(crate) inertia: Vec<DVec3>,
-    /// Rest length between the middles of elements `e - 1` and `e` \[m\]; zero at the first element of a rod (no joint).
+    /// Rest length between the middles of elements `e - 1` and `e` \[m\]; zero at the first element of a rod (no
+    /// joint).
     pub(crate) joint_length: Vec<f64>,
     /// Square root of the rest rotation of the joint between `e - 1` and `e`.
     pub(crate) rest_half: Vec<DQuat>,
-    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; of inextensible rods along the line between its ends) \[N/m\].
+    /// Stiffness of each element along d1, d2 (shear) and d3 (stretch; of inextensible rods along the line between its
+    /// ends) \[N/m\].
     pub(crate) stretch_stiffness: Vec<DVec3>,
     /// Whether each element is one of an inextensible thread.
     pub(crate) inextensible: Vec<bool>,
@@ -130,15 +132,18 @@ impl Model {
         if self.is_element(e) {
             let stiffer = if self.inextensible[e] { INEXTENSIBLE } else { 1.0 };
             let section = &self.section[e];
-            self.stretch_stiffness[e] = DVec3::new(section.kga, section.kga, stiffer * section.ea) / self.rest_length[e];
+            self.stretch_stiffness[e] =
+                DVec3::new(section.kga, section.kga, stiffer * section.ea) / self.rest_length[e];
         }
     }
-    /// Whether the tension of an element is an unknown of the linear system: in an inextensible thread, but for elements at a weld.
+    /// Whether the tension of an element is an unknown of the linear system: in an inextensible thread, but for
+    /// elements at a weld.
     #[inline(always)]
     pub(crate) fn is_tied(&self, e: usize) -> bool {
         self.inextensible[e] && self.weld_of[e].is_none() && self.weld_of[e + 1].is_none()
     }
-    /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of the next.
+    /// Length and stiffness of the joint before element `e`, where there is one: half an element in series with half of
+    /// the next.
     pub(crate) fn refresh_joint(&mut self, e: usize) {
         let joint = e > 0 && self.is_element(e) && self.is_element(e - 1) && self.rod_of[e] == self.rod_of[e - 1];
         if !joint {
@@ -148,7 +153,11 @@ impl Model {
         let (la, lb) = (self.rest_length[e - 1], self.rest_length[e]);
         let (a, b) = (self.section[e - 1].bend, self.section[e].bend);
         self.joint_length[e] = 0.5 * (la + lb);
-        self.bend_stiffness[e] = if a == b { a / self.joint_length[e] } else { (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip() };
+        self.bend_stiffness[e] = if a == b {
+            a / self.joint_length[e]
+        } else {
+            (DVec3::splat(0.5 * la) / a + DVec3::splat(0.5 * lb) / b).recip()
+        };
     }
     /// Lumped masses and spin inertias: half of each element at its ends, and what is attached.
     pub(crate) fn refresh_masses(&mut self, loads: &Slots<LoadState>) {

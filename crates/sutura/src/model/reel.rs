@@ -8,8 +8,9 @@ use crate::model::rod::Rod;
 #[derive(Debug)]
 pub enum Reel {}
 
-/// A reel at an end of a thread, which a pin or clamp holds there. The last element grows and shrinks; beyond 1.6 times its own length it is cut in
-/// two, below 0.4 times it is joined with the next. Removed only with its thread; to stop it, set its rate to zero.
+/// A reel at an end of a thread, which a pin or clamp holds there. The last element grows and shrinks; beyond 1.6 times
+/// its own length it is cut in two, below 0.4 times it is joined with the next. Removed only with its thread; to stop
+/// it, set its rate to zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReelSpec {
     /// The thread, not closed.
@@ -25,10 +26,11 @@ pub struct ReelSpec {
 /// What a reel does.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ReelLaw {
-    /// Feeds length in at this rate \[m/s\], in a substep no more than a thousand elements; draws it back where the rate is negative, down to two
-    /// elements.
+    /// Feeds length in at this rate \[m/s\], in a substep no more than a thousand elements; draws it back where the
+    /// rate is negative, down to two elements.
     Rate(f64),
-    /// Gives off length where the tension at the end would be higher than this \[N\], > 0, as a spool with a brake. Not for inextensible threads.
+    /// Gives off length where the tension at the end would be higher than this \[N\], > 0, as a spool with a brake. Not
+    /// for inextensible threads.
     Brake(f64),
 }
 

@@ -13,11 +13,12 @@ pub enum Rod {}
 /// A thread to insert.
 #[derive(Debug, Clone)]
 pub struct RodSpec {
-    /// Particles along the centerline in the world \[m\], at least two, no two neighbors at one place. A closed thread has at least three, and goes
-    /// on from the last to the first.
+    /// Particles along the centerline in the world \[m\], at least two, no two neighbors at one place. A closed thread
+    /// has at least three, and goes on from the last to the first.
     pub centerline: Vec<DVec3>,
-    /// Material frame of each element, `world_from_material`, third director along the element. `None`: transported without
-    /// twist from the first, whose first director is the across direction nearest to the normal of the first bend.
+    /// Material frame of each element, `world_from_material`, third director along the element. `None`: transported
+    /// without twist from the first, whose first director is the across direction nearest to the normal of the first
+    /// bend.
     pub frames: Option<Vec<DQuat>>,
     /// Shape that the thread has when nothing acts on it.
     pub rest: RestShape,
@@ -27,7 +28,8 @@ pub struct RodSpec {
     pub section: Section,
     /// Angle by which the section is turned about the tangent, from `frames` and the rest shape \[rad\].
     pub roll: f64,
-    /// The same, growing from zero at the start to this at the end, evenly along the rest length \[rad\]: twist without moment.
+    /// The same, growing from zero at the start to this at the end, evenly along the rest length \[rad\]: twist without
+    /// moment.
     pub pretwist: f64,
     /// How size, stiffness and density change along it.
     pub along: Along,
@@ -48,12 +50,13 @@ pub enum RestShape {
     AsInserted,
     /// Straight and untwisted, with the lengths of `centerline`.
     Straight,
-    /// Lengths of the elements \[m\] and rest bend and twist of the joints, along d1, d2, d3 \[1/m\]; either may be left to `centerline`.
+    /// Lengths of the elements \[m\] and rest bend and twist of the joints, along d1, d2, d3 \[1/m\]; either may be
+    /// left to `centerline`.
     Given {
         /// Rest length of each element \[m\], > 0; `None` takes them from `centerline`.
         lengths: Option<Vec<f64>>,
-        /// Rest Darboux vector of each joint between neighboring elements \[rad/m\], of a closed thread with the one from the last to the first at
-        /// the end; `None` is straight and untwisted.
+        /// Rest Darboux vector of each joint between neighboring elements \[rad/m\], of a closed thread with the one
+        /// from the last to the first at the end; `None` is straight and untwisted.
         darboux: Option<Vec<DVec3>>,
     },
 }
@@ -61,8 +64,8 @@ pub enum RestShape {
 /// How the end of a thread is joined to its start. The seam is as stiff as any other joint; it takes no plastic set.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Closure {
-    /// Angle by which the thread is twisted before its ends are joined \[rad\]: moment, spread evenly. Positive is the right-hand rotation of the
-    /// end against the start.
+    /// Angle by which the thread is twisted before its ends are joined \[rad\]: moment, spread evenly. Positive is the
+    /// right-hand rotation of the end against the start.
     pub twist: f64,
 }
 
@@ -71,8 +74,9 @@ pub struct Closure {
 pub enum Stretch {
     /// By T / (E A).
     Elastic,
-    /// Not at all: lengths are held to 1e-5. Where they would take half of E A to hold, as between ends that are driven apart, it stretches as its
-    /// material does, and the report says so ([`IncidentKind::LengthNotKept`](crate::IncidentKind::LengthNotKept)).
+    /// Not at all: lengths are held to 1e-5. Where they would take half of E A to hold, as between ends that are driven
+    /// apart, it stretches as its material does, and the report says so
+    /// ([`IncidentKind::LengthNotKept`](crate::IncidentKind::LengthNotKept)).
     Inextensible,
 }
 
@@ -102,8 +106,9 @@ impl RodSpec {
         Self::new(points, radius, material)
     }
 
-    /// A closed, straight-rest thread of `n_elements` equal elements along a circle about the axis `axis` (unit) through `center`, beginning at
-    /// `center + start` (`start` across the axis, its length is the radius of the circle).
+    /// A closed, straight-rest thread of `n_elements` equal elements along a circle about the axis `axis` (unit)
+    /// through `center`, beginning at `center + start` (`start` across the axis, its length is the radius of the
+    /// circle).
     pub fn ring(center: DVec3, axis: DVec3, start: DVec3, n_elements: usize, radius: f64, material: Material) -> Self {
         let other = axis.cross(start);
         let n = n_elements.max(3);
@@ -114,11 +119,20 @@ impl RodSpec {
         RodSpec { closure: Some(Closure::default()), ..Self::new((0..n).map(at).collect(), radius, material) }
     }
 
-    /// Equal elements on a helix about the axis `axis` (unit) through `center`, starting at `center + start` (`start` across the
-    /// axis, its length is the helix radius), `turns` turns (positive is right-handed), advancing `pitch` \[m\] a turn. The rest
-    /// shape is the helix itself.
+    /// Equal elements on a helix about the axis `axis` (unit) through `center`, starting at `center + start` (`start`
+    /// across the axis, its length is the helix radius), `turns` turns (positive is right-handed), advancing `pitch`
+    /// \[m\] a turn. The rest shape is the helix itself.
     #[allow(clippy::too_many_arguments, reason = "a helix has that many numbers")]
-    pub fn helix(center: DVec3, axis: DVec3, start: DVec3, turns: f64, pitch: f64, n_elements: usize, radius: f64, material: Material) -> Self {
+    pub fn helix(
+        center: DVec3,
+        axis: DVec3,
+        start: DVec3,
+        turns: f64,
+        pitch: f64,
+        n_elements: usize,
+        radius: f64,
+        material: Material,
+    ) -> Self {
         let other = axis.cross(start);
         let n = n_elements.max(1);
         let points = (0..=n)
@@ -190,11 +204,22 @@ pub(crate) fn sections(
         let stiffness = (s.ea + s.bend.max_element()) / length;
         check(what, "section", stiffness, stiffness * 1e6 < f64::MAX, "sizes and moduli of finite stiffness")?;
         let least = s.bend.min_element().min(s.kga).min(s.mass).min(s.inertia.min_element());
-        check(what, "section", least, least.is_normal(), "sizes, moduli and densities whose products are no smaller than the least number")?;
+        check(
+            what,
+            "section",
+            least,
+            least.is_normal(),
+            "sizes, moduli and densities whose products are no smaller than the least number",
+        )?;
         sections.push(s);
     }
     if material.plasticity.is_some() && is_flat(&sections) {
-        return Err(Error::invalid(what, "material.plasticity", section, "no plasticity for a section that is stiffer one way than the other"));
+        return Err(Error::invalid(
+            what,
+            "material.plasticity",
+            section,
+            "no plasticity for a section that is stiffer one way than the other",
+        ));
     }
     Ok(sections)
 }
@@ -208,7 +233,8 @@ pub(crate) fn is_flat(sections: &[SectionStiffness]) -> bool {
 pub(crate) struct Lowered {
     /// Of a closed thread with the first once more at the end.
     pub centerline: Vec<DVec3>,
-    /// Of a closed thread: square roots of the rest rotations from the last frame to the seam and from there to the first.
+    /// Of a closed thread: square roots of the rest rotations from the last frame to the seam and from there to the
+    /// first.
     pub seam: Option<[DQuat; 2]>,
     pub rest_lengths: Vec<f64>,
     /// Square root of the rest rotation of each joint; entry j is between frames j-1 and j (entry 0 unused, identity).
@@ -233,14 +259,24 @@ impl RodSpec {
         check(what, "pretwist", self.pretwist, true, "a finite angle [rad]")?;
         let closed = self.closure.is_some();
         if self.centerline.len() < if closed { 3 } else { 2 } {
-            return Err(Error::invalid(what, "centerline", format!("{} points", self.centerline.len()), "at least 2 points, 3 of a closed thread"));
+            return Err(Error::invalid(
+                what,
+                "centerline",
+                format!("{} points", self.centerline.len()),
+                "at least 2 points, 3 of a closed thread",
+            ));
         }
         let mut points = self.centerline.clone();
         points.extend(closed.then(|| points[0]));
         let points = &points;
         for (i, p) in points.iter().enumerate() {
             if !crate::math::is_place(*p) {
-                return Err(Error::invalid(what, format!("centerline[{i}]"), p, "finite coordinates whose squares are finite too [m]"));
+                return Err(Error::invalid(
+                    what,
+                    format!("centerline[{i}]"),
+                    p,
+                    "finite coordinates whose squares are finite too [m]",
+                ));
             }
         }
         let n = points.len() - 1;
@@ -249,17 +285,29 @@ impl RodSpec {
         for i in 0..n {
             let l = (points[i + 1] - points[i]).length();
             if !(l.is_finite() && l > shortest) {
-                return Err(Error::invalid(what, format!("centerline[{i}..{}]", i + 1), l, "neighboring points farther apart than radius / 1000"));
+                return Err(Error::invalid(
+                    what,
+                    format!("centerline[{i}..{}]", i + 1),
+                    l,
+                    "neighboring points farther apart than radius / 1000",
+                ));
             }
         }
         if closed {
             // One that turns back on itself lies in itself there, and no seam holds it so.
             const SHARPEST: f64 = 3.0;
             let along = |i: usize| (points[i % n + 1] - points[i % n]).normalize();
-            let sharp = (1..=n).map(|i| (i, log(rotation_arc(along(i - 1), along(i))).length())).find(|(_, turn)| *turn > SHARPEST);
+            let sharp = (1..=n)
+                .map(|i| (i, log(rotation_arc(along(i - 1), along(i))).length()))
+                .find(|(_, turn)| *turn > SHARPEST);
             if let Some((i, turn)) = sharp {
                 let (field, value) = (format!("centerline[{}]", i % n), format!("a turn by {turn:.2} rad"));
-                return Err(Error::Invalid { what, field, value, wanted: "a closed thread that nowhere turns back on itself (by more than 3 rad)" });
+                return Err(Error::Invalid {
+                    what,
+                    field,
+                    value,
+                    wanted: "a closed thread that nowhere turns back on itself (by more than 3 rad)",
+                });
             }
         }
         let mut frames = match &self.frames {
@@ -270,13 +318,21 @@ impl RodSpec {
                 for (i, q) in f.iter().enumerate() {
                     let t = (points[i + 1] - points[i]).normalize();
                     if !q.is_finite() || (q.length() - 1.0).abs() > 1e-6 || (*q * DVec3::Z).dot(t) < 0.9 {
-                        return Err(Error::invalid(what, format!("frames[{i}]"), q, "a unit quaternion whose third director is along the element"));
+                        return Err(Error::invalid(
+                            what,
+                            format!("frames[{i}]"),
+                            q,
+                            "a unit quaternion whose third director is along the element",
+                        ));
                     }
                 }
                 f.iter().map(|q| q.normalize()).collect()
             }
             None => {
-                let bend = points.windows(3).map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize())).find(|c| c.length() > 1e-6);
+                let bend = points
+                    .windows(3)
+                    .map(|w| (w[1] - w[0]).normalize().cross((w[2] - w[1]).normalize()))
+                    .find(|c| c.length() > 1e-6);
                 let mut frames = transported_frames(points, bend.unwrap_or(DVec3::ZERO));
                 if closed {
                     // What the frames lack to meet at the seam is spread over all joints.
@@ -304,10 +360,22 @@ impl RodSpec {
             }
             RestShape::Given { lengths, darboux } => {
                 let lengths = match lengths {
-                    Some(l) if l.len() != n => return Err(Error::invalid(what, "rest.lengths", format!("{} lengths", l.len()), "one for each element")),
+                    Some(l) if l.len() != n => {
+                        return Err(Error::invalid(
+                            what,
+                            "rest.lengths",
+                            format!("{} lengths", l.len()),
+                            "one for each element",
+                        ));
+                    }
                     Some(l) => {
                         if let Some(i) = l.iter().position(|l| !(l.is_finite() && *l > shortest)) {
-                            return Err(Error::invalid(what, format!("rest.lengths[{i}]"), l[i], "a finite length > radius / 1000 [m]"));
+                            return Err(Error::invalid(
+                                what,
+                                format!("rest.lengths[{i}]"),
+                                l[i],
+                                "a finite length > radius / 1000 [m]",
+                            ));
                         }
                         l.clone()
                     }
@@ -315,13 +383,23 @@ impl RodSpec {
                 };
                 if let Some(d) = darboux {
                     if d.len() + first_joint != n {
-                        return Err(Error::invalid(what, "rest.darboux", format!("{} joints", d.len()), "one for each joint between neighboring elements"));
+                        return Err(Error::invalid(
+                            what,
+                            "rest.darboux",
+                            format!("{} joints", d.len()),
+                            "one for each joint between neighboring elements",
+                        ));
                     }
                     for j in first_joint..n {
                         let before = (j + n - 1) % n;
                         let phi = d[before] * (0.5 * (lengths[before] + lengths[j]));
                         if !(phi.is_finite() && phi.length() < 3.0) {
-                            return Err(Error::invalid(what, format!("rest.darboux[{before}]"), d[before], "finite, under 3 rad per element"));
+                            return Err(Error::invalid(
+                                what,
+                                format!("rest.darboux[{before}]"),
+                                d[before],
+                                "finite, under 3 rad per element",
+                            ));
                         }
                         rest_half[j] = exp(phi * 0.5);
                     }
@@ -338,7 +416,8 @@ impl RodSpec {
             .collect();
         if self.roll != 0.0 || self.pretwist != 0.0 {
             let rate = self.pretwist / rest_lengths.iter().sum::<f64>();
-            let evenly = rest_lengths.iter().all(|l| (rate * l).abs() < 3.0) && middles.iter().all(|s| (rate * s).is_finite());
+            let evenly =
+                rest_lengths.iter().all(|l| (rate * l).abs() < 3.0) && middles.iter().all(|s| (rate * s).is_finite());
             check(what, "pretwist", self.pretwist, evenly, "under 3 rad per element")?;
             let turn: Vec<DQuat> = middles.iter().map(|s| exp(DVec3::Z * (self.roll + rate * s))).collect();
             for j in first_joint..n {
@@ -357,7 +436,13 @@ impl RodSpec {
         rest_half[0] = DQuat::IDENTITY;
         if let Some(Closure { twist }) = self.closure {
             let length: f64 = rest_lengths.iter().sum();
-            check(what, "closure.twist", twist, (twist / n as f64).abs() < 3.0, "a finite angle under 3 rad per element [rad]")?;
+            check(
+                what,
+                "closure.twist",
+                twist,
+                (twist / n as f64).abs() < 3.0,
+                "a finite angle under 3 rad per element [rad]",
+            )?;
             for (q, s) in frames.iter_mut().zip(&middles) {
                 *q = (*q * exp(DVec3::Z * (twist * s / length))).normalize();
             }
@@ -365,6 +450,15 @@ impl RodSpec {
         let factors: Vec<Factors> = middles.iter().map(|s| self.along.at(*s)).collect();
         let elements = factors.iter().copied().zip(rest_lengths.iter().copied());
         let sections = sections(&self.material, &self.section, self.radius, elements)?;
-        Ok(Lowered { centerline: points.clone(), seam, rest_lengths, rest_half, frames, factors, sections, radius: self.radius * self.along.size.largest() })
+        Ok(Lowered {
+            centerline: points.clone(),
+            seam,
+            rest_lengths,
+            rest_half,
+            frames,
+            factors,
+            sections,
+            radius: self.radius * self.along.size.largest(),
+        })
     }
 }

@@ -3,8 +3,8 @@
 use crate::error::{Error, check};
 use core::f64::consts::PI;
 
-/// Shape of the cross-section, with its principal axes along the directors d1 and d2. What touches is always a round thread of
-/// [`RodSpec::radius`](crate::RodSpec::radius).
+/// Shape of the cross-section, with its principal axes along the directors d1 and d2. What touches is always a round
+/// thread of [`RodSpec::radius`](crate::RodSpec::radius).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Section {
     /// Round, of the thread's radius.
@@ -40,16 +40,25 @@ impl Section {
             Section::Ellipse([a, b]) => {
                 let area = PI * a * b;
                 // Torsion: Saint-Venant 1855; Timoshenko and Goodier, Theory of Elasticity, section 107.
-                Areas { area, about: [0.25 * area * b * b, 0.25 * area * a * a], torsion: area * (a * b) * (a * b) / (a * a + b * b) }
+                Areas {
+                    area,
+                    about: [0.25 * area * b * b, 0.25 * area * a * a],
+                    torsion: area * (a * b) * (a * b) / (a * a + b * b),
+                }
             }
             Section::Rectangle([a, b]) => {
                 let area = a * b;
-                Areas { area, about: [area * b * b / 12.0, area * a * a / 12.0], torsion: torsion_of_rectangle(a.max(b), a.min(b)) }
+                Areas {
+                    area,
+                    about: [area * b * b / 12.0, area * a * a / 12.0],
+                    torsion: torsion_of_rectangle(a.max(b), a.min(b)),
+                }
             }
         }
     }
 
-    /// Shear correction factor of Cowper (1966). A rectangle's is the same in both directions; an ellipse takes that of a circle.
+    /// Shear correction factor of Cowper (1966). A rectangle's is the same in both directions; an ellipse takes that of
+    /// a circle.
     pub(crate) fn shear_factor(&self, nu: f64) -> f64 {
         match self {
             Section::Round | Section::Ellipse(_) => 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu),
@@ -82,16 +91,19 @@ impl Section {
 }
 
 /// Torsion constant of a rectangle with sides a >= b (Saint-Venant's series; Timoshenko and Goodier, section 109):
-/// `a b^3 (1/3 - 64 / pi^5 (b / a) sum tanh(n pi a / 2 b) / n^5)` over odd n. The sum of 1 / n^5 is taken out in closed form,
-/// 31/32 zeta(5); what is left, `1 - tanh(x) = 2 / (exp(2 x) + 1)`, vanishes to the last bit after six terms.
+/// `a b^3 (1/3 - 64 / pi^5 (b / a) sum tanh(n pi a / 2 b) / n^5)` over odd n. The sum of 1 / n^5 is taken out in closed
+/// form, 31/32 zeta(5); what is left, `1 - tanh(x) = 2 / (exp(2 x) + 1)`, vanishes to the last bit after six terms.
 fn torsion_of_rectangle(a: f64, b: f64) -> f64 {
     const SUM: f64 = 31.0 / 32.0 * 1.036_927_755_143_37;
-    let rest: f64 = [1.0f64, 3.0, 5.0, 7.0, 9.0, 11.0].iter().map(|n| 2.0 / (n * n * n * n * n * (libm::exp(n * PI * a / b) + 1.0))).sum();
+    let rest: f64 = [1.0f64, 3.0, 5.0, 7.0, 9.0, 11.0]
+        .iter()
+        .map(|n| 2.0 / (n * n * n * n * n * (libm::exp(n * PI * a / b) + 1.0)))
+        .sum();
     a * b * b * b * (1.0 / 3.0 - 64.0 / (PI * PI * PI * PI * PI) * (b / a) * (SUM - rest))
 }
 
-/// A factor along a thread: linear between points (rest arc length from the start \[m\], factor), constant before the first and after the
-/// last. Without points it is 1.
+/// A factor along a thread: linear between points (rest arc length from the start \[m\], factor), constant before the
+/// first and after the last. Without points it is 1.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Profile(pub Vec<(f64, f64)>);
 
@@ -160,13 +172,24 @@ mod tests {
     #[test]
     fn torsion_of_rectangles_as_tabulated() {
         // Timoshenko and Goodier, table of section 109: J = k1 a b^3.
-        for (ratio, k) in [(1.0, 0.1406), (1.2, 0.166), (1.5, 0.196), (2.0, 0.229), (2.5, 0.249), (3.0, 0.263), (4.0, 0.281), (5.0, 0.291), (10.0, 0.312)] {
+        for (ratio, k) in [
+            (1.0, 0.1406),
+            (1.2, 0.166),
+            (1.5, 0.196),
+            (2.0, 0.229),
+            (2.5, 0.249),
+            (3.0, 0.263),
+            (4.0, 0.281),
+            (5.0, 0.291),
+            (10.0, 0.312),
+        ] {
             let j = torsion_of_rectangle(ratio, 1.0) / ratio;
             assert!((j - k).abs() < 6e-4, "{ratio}: {j} {k}");
         }
         // The plain series to 2000 terms.
         let series = |a: f64| {
-            let sum: f64 = (0..2000).map(|i| f64::from(2 * i + 1)).map(|n| libm::tanh(0.5 * n * PI * a) / n.powi(5)).sum();
+            let sum: f64 =
+                (0..2000).map(|i| f64::from(2 * i + 1)).map(|n| libm::tanh(0.5 * n * PI * a) / n.powi(5)).sum();
             a * (1.0 / 3.0 - 64.0 / PI.powi(5) / a * sum)
         };
         for a in [1.0, 1.3, 4.0, 50.0] {

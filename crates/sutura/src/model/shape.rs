@@ -20,7 +20,8 @@ pub struct ShapeSpec {
     pub surface: u32,
     /// What moves it.
     pub motion: ShapeMotion,
-    /// Whether a mesh that would be closed but for small holes is meant so. It is then a sheet with two sides; else it is refused.
+    /// Whether a mesh that would be closed but for small holes is meant so. It is then a sheet with two sides; else it
+    /// is refused.
     pub open: bool,
 }
 
@@ -53,9 +54,9 @@ pub enum Geometry {
         /// Half the side along each axis \[m\].
         half_sides: DVec3,
     },
-    /// A triangle mesh, corners counterclockwise as seen from outside. A closed one is solid, or a container where its normals point inward; of an open one
-    /// threads stay on the side on which they are when they first come near. What was mended when it was inserted, and whether it is open, says
-    /// [`World::shape_notes`](crate::World::shape_notes).
+    /// A triangle mesh, corners counterclockwise as seen from outside. A closed one is solid, or a container where its
+    /// normals point inward; of an open one threads stay on the side on which they are when they first come near. What
+    /// was mended when it was inserted, and whether it is open, says [`World::shape_notes`](crate::World::shape_notes).
     Mesh {
         /// Corners \[m\].
         vertices: Vec<DVec3>,
@@ -71,7 +72,8 @@ pub enum ShapeMotion {
     Fixed,
     /// The user, through [`World::set_shape_pose`](crate::World::set_shape_pose).
     Driven,
-    /// A force along a line, with a speed limit (see [`Drive::Force`](crate::Drive::Force) for the law). It does not turn.
+    /// A force along a line, with a speed limit (see [`Drive::Force`](crate::Drive::Force) for the law). It does not
+    /// turn.
     Pushed {
         /// Direction of the force in the world, a unit vector.
         direction: DVec3,
@@ -118,7 +120,8 @@ impl ShapeSpec {
         let Geometry::Mesh { vertices, triangles } = &self.geometry else {
             return Ok(Checked { geometry: self.geometry.clone(), closed: true, container: false, notes: Vec::new() });
         };
-        let CheckedMesh { vertices, triangles, closed, container, notes } = mesh::check(vertices, triangles, self.open)?;
+        let CheckedMesh { vertices, triangles, closed, container, notes } =
+            mesh::check(vertices, triangles, self.open)?;
         Ok(Checked { geometry: Geometry::Mesh { vertices, triangles }, closed, container, notes })
     }
 }

@@ -12,11 +12,12 @@ use glam::{DQuat, DVec3};
 #[derive(Debug)]
 pub enum Weld {}
 
-/// Places to join. They become one cross-section: one point with one orientation, which every thread there holds as a clamp does, with half an
-/// element of its own compliance on each side.
+/// Places to join. They become one cross-section: one point with one orientation, which every thread there holds as a
+/// clamp does, with half an element of its own compliance on each side.
 #[derive(Debug, Clone)]
 pub struct WeldSpec {
-    /// The places, at least two; ends or inner particles, no place twice. They lie within a tenth of the smallest radius of each other.
+    /// The places, at least two; ends or inner particles, no place twice. They lie within a tenth of the smallest
+    /// radius of each other.
     pub places: Vec<(Handle<Rod>, Place)>,
     /// Shape of the joint when nothing acts on it.
     pub rest: WeldRest,
@@ -25,9 +26,11 @@ pub struct WeldSpec {
 /// Shape of a weld at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WeldRest {
-    /// The directions in which threads end there now are free of moment. A thread that goes on through the weld keeps its own rest shape.
+    /// The directions in which threads end there now are free of moment. A thread that goes on through the weld keeps
+    /// its own rest shape.
     AsInserted,
-    /// Two ends that go on straight into each other, without moment where their directions agree; turned about their direction as they are now.
+    /// Two ends that go on straight into each other, without moment where their directions agree; turned about their
+    /// direction as they are now.
     Straight,
 }
 
@@ -53,7 +56,8 @@ pub(crate) struct Member {
 /// How a thread leaves a weld on one side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Side {
-    /// The thread's own cross-section there, `weld_from_section`, so that the half joint bends and twists about its own directions.
+    /// The thread's own cross-section there, `weld_from_section`, so that the half joint bends and twists about its own
+    /// directions.
     pub section: DQuat,
     /// Square root of the rest rotation over the half element beside it.
     pub rest_half: DQuat,
@@ -120,7 +124,12 @@ impl WeldSpec {
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
         if self.places.len() < 2 || self.rest == WeldRest::Straight && self.places.len() != 2 {
-            return Err(Error::invalid("weld", "places", self.places.len(), "at least two places; two where they go on straight"));
+            return Err(Error::invalid(
+                "weld",
+                "places",
+                self.places.len(),
+                "at least two places; two where they go on straight",
+            ));
         }
         Ok(())
     }

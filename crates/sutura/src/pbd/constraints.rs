@@ -1,11 +1,13 @@
 //! Constraints of the rod, dimensionless, each projected by itself: `dp = -W J^T (J W J^T)^-1 C` (rows P-1, P-4, P-5).
 //!
-//! Shear and stretch `C = (x1 - x0) / l - R(q) e3`; bend and twist `C = Im(conj(q) u - s conj(q0) u0)`, s = +1 or -1, whichever rest rotation is nearer.
-//! A quaternion counts as four free numbers: then both `J W J^T` are multiples of the identity, `(w0 + w1) / l^2 + 4 wq` and `wq + wu`, and the
-//! corrected quaternions are normalized. Stiffness in [0, 1] multiplies the correction, that of bend and twist a component each.
+//! Shear and stretch `C = (x1 - x0) / l - R(q) e3`; bend and twist `C = Im(conj(q) u - s conj(q0) u0)`, s = +1 or -1,
+//! whichever rest rotation is nearer. A quaternion counts as four free numbers: then both `J W J^T` are multiples of
+//! the identity, `(w0 + w1) / l^2 + 4 wq` and `wq + wu`, and the corrected quaternions are normalized. Stiffness in [0,
+//! 1] multiplies the correction, that of bend and twist a component each.
 //!
-//! Source: Kugelstadt and Schoemer 2016, eqs. 37, 40, as taken over by the 2018 paper's (8), (11). Limits: the part of a correction that only changes the length of a
-//! quaternion is lost with the normalization, so that pure stretch converges slower than its linear step says.
+//! Source: Kugelstadt and Schoemer 2016, eqs. 37, 40, as taken over by the 2018 paper's (8), (11). Limits: the part of
+//! a correction that only changes the length of a quaternion is lost with the normalization, so that pure stretch
+//! converges slower than its linear step says.
 
 use super::number::{Number, Quat, Vec3};
 use glam::{DQuat, DVec3};
@@ -53,7 +55,11 @@ impl<T: Number> StretchShear<T> {
     pub fn project(&self, x0: Vec3<T>, x1: Vec3<T>, q: Quat<T>) -> (Vec3<T>, Vec3<T>, Quat<T>) {
         let c = self.value(x0, x1, q);
         // dC/dq is minus that of the director.
-        (x0 + c * self.particles[0], x1 - c * self.particles[1], (q + half_director_pull(q, c * self.turn)).normalized())
+        (
+            x0 + c * self.particles[0],
+            x1 - c * self.particles[1],
+            (q + half_director_pull(q, c * self.turn)).normalized(),
+        )
     }
 }
 
@@ -75,9 +81,13 @@ impl BendTwist<f64> {
 
 impl<T: Number> BendTwist<T> {
     pub fn each(of_lane: impl Fn(usize) -> BendTwist<f64>) -> Self {
-        BendTwist { rest: Quat::each(|k| of_lane(k).rest), frames: [0, 1].map(|i| Vec3::each(|k| of_lane(k).frames[i])) }
+        BendTwist {
+            rest: Quat::each(|k| of_lane(k).rest),
+            frames: [0, 1].map(|i| Vec3::each(|k| of_lane(k).frames[i])),
+        }
     }
-    /// Of the frames `q * inverse`, a unit quaternion, and `u`. The factor comes late since in a chain of joints it is known late.
+    /// Of the frames `q * inverse`, a unit quaternion, and `u`. The factor comes late since in a chain of joints it is
+    /// known late.
     #[inline(always)]
     pub fn value(&self, q: Quat<T>, inverse: T, u: Quat<T>) -> Vec3<T> {
         let now = q.conjugate_times(u);
@@ -162,7 +172,8 @@ mod tests {
 
     #[test]
     fn a_projection_is_the_one_of_p_1() {
-        // With dp = W J^T lambda and J W J^T lambda = -C the linearized constraint is met before the quaternion is normalized.
+        // With dp = W J^T lambda and J W J^T lambda = -C the linearized constraint is met before the quaternion is
+        // normalized.
         let (l, w, wq) = (0.3, [2.0, 0.7], 9.0);
         let c = StretchShear::new(l, w, wq, 1.0);
         let q = exp(DVec3::new(0.2, 0.4, -0.3));
@@ -185,7 +196,12 @@ mod tests {
         let value = joint.value(q.into(), 1.0, u.into());
         let [a, b] = joint.project(q.into(), 1.0, u.into()).map(Quat::normalized);
         let (after, value) = (vector(joint.value(a, 1.0, b)), vector(value));
-        assert!(after.length() < value.length() * value.length(), "second order: {} after {}", after.length(), value.length());
+        assert!(
+            after.length() < value.length() * value.length(),
+            "second order: {} after {}",
+            after.length(),
+            value.length()
+        );
     }
 
     /// The frame that comes unnormalized, and two frames in lanes.

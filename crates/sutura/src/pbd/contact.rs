@@ -1,17 +1,20 @@
 //! Contact of the paper (rows P-8 to P-10): a thread is a chain of spheres, one a particle.
 //!
-//! Once a step, over the way from the last state to the predicted one: boxes of swept spheres into a spatial hash; boxes that overlap; the time of impact of two
-//! spheres, a root of a quadratic. The normal n there is kept. Every iteration projects, with r = x_a - x_b, u = r / |r|,
+//! Once a step, over the way from the last state to the predicted one: boxes of swept spheres into a spatial hash;
+//! boxes that overlap; the time of impact of two spheres, a root of a quadratic. The normal n there is kept. Every
+//! iteration projects, with r = x_a - x_b, u = r / |r|,
 //!
 //! ```text
 //! C_c = r . n - d >= 0 [m]                          gradient n
 //! C_f = |u x n|        once C_c has pushed          gradient (I - u u^T) (n x s) / |r|,  s = (u x n) / |u x n|
 //! ```
 //!
-//! The friction strength k multiplies the correction: inside C_f, as printed, it cancels. Shapes, of which the paper has edges only, are met by the sphere's distance
-//! from them; the point met moves with the shape and has no inverse mass.
+//! The friction strength k multiplies the correction: inside C_f, as printed, it cancels. Shapes, of which the paper
+//! has edges only, are met by the sphere's distance from them; the point met moves with the shape and has no inverse
+//! mass.
 //!
-//! Limits: between spheres farther apart than their diameter there are gaps; what comes near in the projections only is seen a step later; there are no forces.
+//! Limits: between spheres farther apart than their diameter there are gaps; what comes near in the projections only is
+//! seen a step later; there are no forces.
 
 use crate::collide::Collider;
 use crate::math::Pose;
@@ -73,7 +76,8 @@ pub(super) struct Motion<'a> {
     pub shapes_from: &'a [Pose],
 }
 
-/// When, in [0, 1], two spheres first touch whose centers are `r` apart and move by `d` against each other; at once where they overlap.
+/// When, in [0, 1], two spheres first touch whose centers are `r` apart and move by `d` against each other; at once
+/// where they overlap.
 fn time_of_impact(r: DVec3, d: DVec3, sum: f64) -> Option<f64> {
     let c = r.length_squared() - sum * sum;
     if c <= 0.0 {
@@ -89,7 +93,8 @@ fn time_of_impact(r: DVec3, d: DVec3, sum: f64) -> Option<f64> {
     (t <= 1.0).then_some(t)
 }
 
-/// The friction constraint and its gradient over x_a; none where there is nothing to undo, or nothing that would (a right angle).
+/// The friction constraint and its gradient over x_a; none where there is nothing to undo, or nothing that would (a
+/// right angle).
 fn friction(r: DVec3, n: DVec3) -> Option<(f64, DVec3)> {
     let length = r.length();
     let u = r / length;
@@ -183,7 +188,8 @@ impl Contacts {
         }
         let sum = m.radius[i] + m.radius[j];
         // Neighbors along the thread, to half a turn of its own radius.
-        if model.rod_of[i] == model.rod_of[j] && (self.arc[j] - self.arc[i]).abs() < core::f64::consts::FRAC_PI_2 * sum {
+        if model.rod_of[i] == model.rod_of[j] && (self.arc[j] - self.arc[i]).abs() < core::f64::consts::FRAC_PI_2 * sum
+        {
             return;
         }
         let (r, d) = (m.from[i] - m.from[j], (m.to[i] - m.from[i]) - (m.to[j] - m.from[j]));
@@ -204,7 +210,13 @@ impl Contacts {
                 }
                 let way = [from.inverse_transform_point(m.from[i]), to.inverse_transform_point(m.to[i])];
                 if let Some((point, normal)) = meet_shape(&shape.collider, way, m.radius[i]) {
-                    self.push(i as u32, Other::Point(to.transform_point(point)), to.orientation * normal, m.radius[i], [m.inverse_mass[i], 0.0]);
+                    self.push(
+                        i as u32,
+                        Other::Point(to.transform_point(point)),
+                        to.orientation * normal,
+                        m.radius[i],
+                        [m.inverse_mass[i], 0.0],
+                    );
                 }
             }
         }
@@ -254,7 +266,8 @@ impl Contact {
     }
 }
 
-/// Where a sphere meets a shape on its way, both in the frame of the shape: the point of the surface and the normal. By steps that the distance allows.
+/// Where a sphere meets a shape on its way, both in the frame of the shape: the point of the surface and the normal. By
+/// steps that the distance allows.
 fn meet_shape(shape: &Collider, [from, to]: [DVec3; 2], radius: f64) -> Option<(DVec3, DVec3)> {
     let way = (to - from).length();
     let mut t = 0.0;
@@ -279,7 +292,9 @@ fn meet_shape(shape: &Collider, [from, to]: [DVec3; 2], radius: f64) -> Option<(
 /// Hash of a cell (Teschner et al. 2003, with other odd numbers).
 fn hash(cell: [i64; 3]) -> u32 {
     let [x, y, z] = cell.map(|c| c as u64);
-    let h = x.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f) ^ z.wrapping_mul(0x1656_67b1_9e37_79f9);
+    let h = x.wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        ^ y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f)
+        ^ z.wrapping_mul(0x1656_67b1_9e37_79f9);
     (h >> 32) as u32
 }
 
@@ -316,7 +331,10 @@ mod tests {
         for axis in DVec3::AXES {
             let value = |s: f64| friction(r + axis * s, n).unwrap().0;
             let slope = (value(h) - value(-h)) / (2.0 * h);
-            assert!((slope - gradient.dot(axis)).abs() < 1e-9 && (printed - gradient).dot(axis).abs() < 1e-14, "{slope} {gradient} {printed}");
+            assert!(
+                (slope - gradient.dot(axis)).abs() < 1e-9 && (printed - gradient).dot(axis).abs() < 1e-14,
+                "{slope} {gradient} {printed}"
+            );
         }
         assert!(friction(n * 3.0, n).is_none_or(|(c, _)| c < 1e-15), "nothing to undo");
     }
@@ -358,9 +376,16 @@ mod tests {
         let model = Model { rod_of: (0..n as u32).collect(), mass: vec![1.0; n], ..Model::default() };
         let state = State { rest_length: vec![0.0; n], ..State::default() };
         let mut contacts = Contacts::default();
-        contacts.detect(&model, &state, &Motion { from: &from, to: &to, radius: &radius, inverse_mass: &w, shapes_from: &[] });
-        let found: Vec<(usize, usize)> =
-            contacts.list.iter().map(|c| (c.a as usize, if let Other::Particle(b) = c.b { b as usize } else { panic!("no shapes") })).collect();
+        contacts.detect(
+            &model,
+            &state,
+            &Motion { from: &from, to: &to, radius: &radius, inverse_mass: &w, shapes_from: &[] },
+        );
+        let found: Vec<(usize, usize)> = contacts
+            .list
+            .iter()
+            .map(|c| (c.a as usize, if let Other::Particle(b) = c.b { b as usize } else { panic!("no shapes") }))
+            .collect();
         let mut wanted = Vec::new();
         for i in 0..n {
             for j in i + 1..n {

@@ -1,9 +1,10 @@
-//! The direct distance constraint (rows P-6, P-7): all lengths of a chain, `C_i = |x_i - x_(i+1)| - l_i` \[m\], linearized and solved at once. `J W J^T` is
-//! tridiagonal, `w_i + w_(i+1)` beside `-w_(i+1) n_i . n_(i+1)`, n_i along `x_i - x_(i+1)`; a held particle (w = 0) splits it by itself.
+//! The direct distance constraint (rows P-6, P-7): all lengths of a chain, `C_i = |x_i - x_(i+1)| - l_i` \[m\],
+//! linearized and solved at once. `J W J^T` is tridiagonal, `w_i + w_(i+1)` beside `-w_(i+1) n_i . n_(i+1)`, n_i along
+//! `x_i - x_(i+1)`; a held particle (w = 0) splits it by itself.
 //!
-//! Source: Han and Harada 2013; the paper's (12) to (15), whose `-1, -2` are those of equal masses and a first particle that is held. Limits: an element
-//! held at both ends has no row; a straight chain between two held particles has one row too many (the matrix is that of a
-//! path without ends): the row whose pivot vanishes is left out.
+//! Source: Han and Harada 2013; the paper's (12) to (15), whose `-1, -2` are those of equal masses and a first particle
+//! that is held. Limits: an element held at both ends has no row; a straight chain between two held particles has one
+//! row too many (the matrix is that of a path without ends): the row whose pivot vanishes is left out.
 
 use super::number::{Number, Vec3};
 use glam::DVec3;
@@ -40,13 +41,15 @@ impl Chain {
         if pairs < n {
             measure::<f64>(&x[pairs..], &l[pairs..], &mut normal[pairs..], &mut lambda[pairs..]);
         }
-        // Thomas, each row with the pivot and the right side of the row before. Pivots are a chain of divisions: nothing else is in it.
+        // Thomas, each row with the pivot and the right side of the row before. Pivots are a chain of divisions:
+        // nothing else is in it.
         let (mut taken, mut right, mut beside) = (0.0, 0.0, 0.0);
         for i in 0..n {
             let diagonal = w[i] + w[i + 1];
             let pivot = diagonal - taken;
             let next = if i + 1 < n { -w[i + 1] * normal[i].dot(normal[i + 1]) } else { 0.0 };
-            let (inverse, square) = if pivot > DEPENDENT * diagonal { (1.0 / pivot, next * next / pivot) } else { (0.0, 0.0) };
+            let (inverse, square) =
+                if pivot > DEPENDENT * diagonal { (1.0 / pivot, next * next / pivot) } else { (0.0, 0.0) };
             right = (lambda[i] - beside * right) * inverse;
             (upper[i], lambda[i]) = (next * inverse, right);
             (taken, beside) = (square, next);
@@ -88,7 +91,8 @@ mod tests {
                 let here = at;
                 let s = i as f64;
                 // Lengths are off by up to `off`, directions by `bend`.
-                at += DVec3::new(1.0, bend * (1.3 * s).sin(), bend * (2.1 * s).cos()).normalize() * (1.0 + off * (0.7 * s).sin());
+                at += DVec3::new(1.0, bend * (1.3 * s).sin(), bend * (2.1 * s).cos()).normalize()
+                    * (1.0 + off * (0.7 * s).sin());
                 here
             })
             .collect()

@@ -1,6 +1,7 @@
-//! The solver of the 2018 paper, "Real-time inextensible surgical thread simulation", over the same model and state: kept as published, for reproduction and
-//! comparison. Order of its stages (rows P-1, P-2): predict, find what meets on the way, iterations of shear and stretch, bend and
-//! twist, lengths, contact, friction; velocities; damping. Theory 17 says what was changed and why.
+//! The solver of the 2018 paper, "Real-time inextensible surgical thread simulation", over the same model and state:
+//! kept as published, for reproduction and comparison. Order of its stages (rows P-1, P-2): predict, find what meets on
+//! the way, iterations of shear and stretch, bend and twist, lengths, contact, friction; velocities; damping. Theory 17
+//! says what was changed and why.
 
 mod constraints;
 mod contact;
@@ -36,7 +37,14 @@ pub(crate) struct Work {
 }
 
 /// Advances the whole world by the interval, in equal substeps no longer than the setting.
-pub(crate) fn step(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &mut Interval<'_>, p: &PaperSettings, report: &mut StepReport) {
+pub(crate) fn step(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &mut Interval<'_>,
+    p: &PaperSettings,
+    report: &mut StepReport,
+) {
     if let Some(what) = unknown(model, state) {
         report.incidents.push(Incident { time: interval.start, kind: IncidentKind::NotInPaper { what } });
         state.time = interval.start + interval.length;
@@ -81,7 +89,9 @@ pub(crate) fn unknown(model: &Model, state: &State) -> Option<&'static str> {
         return Some("a reel");
     }
     // Set may be left of a material that took some.
-    if model.rods.iter().any(|(_, r)| r.material.plasticity.is_some()) || state.plastic.iter().any(|a| *a != DVec3::ZERO) {
+    if model.rods.iter().any(|(_, r)| r.material.plasticity.is_some())
+        || state.plastic.iter().any(|a| *a != DVec3::ZERO)
+    {
         return Some("plastic set");
     }
     if model.shapes.iter().any(|(_, s)| matches!(s.motion, ShapeMotion::Pushed { .. })) {
@@ -118,17 +128,29 @@ fn weigh(model: &Model, state: &State, work: &mut Work, p: &PaperSettings) {
     sweep.set(
         p.order,
         (0..n).map(|e| {
-            let (l, ends) = if model.is_element(e) { (model.rest_length[e], [w[e], w[e + 1]]) } else { (1.0, [0.0, 0.0]) };
+            let (l, ends) =
+                if model.is_element(e) { (model.rest_length[e], [w[e], w[e + 1]]) } else { (1.0, [0.0, 0.0]) };
             let pair = if model.is_joint(e) { [wq[e - 1], wq[e]] } else { [0.0, 0.0] };
             let rest = model.rest_half[e] * model.rest_half[e];
-            (StretchShear::new(l, ends, wq[e], p.stretch_shear), BendTwist::new(rest, pair, DVec3::new(p.bend[0], p.bend[1], p.twist)))
+            (
+                StretchShear::new(l, ends, wq[e], p.stretch_shear),
+                BendTwist::new(rest, pair, DVec3::new(p.bend[0], p.bend[1], p.twist)),
+            )
         }),
     );
     chain.resize(n);
 }
 
 /// One step of the paper, to time `t`. False where a number is not finite.
-fn substep(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &Interval<'_>, p: &PaperSettings, t: f64, h: f64) -> bool {
+fn substep(
+    model: &Model,
+    state: &mut State,
+    scratch: &mut Scratch,
+    interval: &Interval<'_>,
+    p: &PaperSettings,
+    t: f64,
+    h: f64,
+) -> bool {
     predict(model, state, scratch, h);
     hold(model, state, interval, t);
     step::move_shapes(model, state, interval, t, h);
@@ -136,7 +158,13 @@ fn substep(model: &Model, state: &mut State, scratch: &mut Scratch, interval: &I
         return false;
     }
     let Scratch { start, radius, start_shape_pose, paper, .. } = scratch;
-    let motion = Motion { from: start, to: &state.position, radius, inverse_mass: &paper.inverse_mass, shapes_from: start_shape_pose };
+    let motion = Motion {
+        from: start,
+        to: &state.position,
+        radius,
+        inverse_mass: &paper.inverse_mass,
+        shapes_from: start_shape_pose,
+    };
     paper.contacts.detect(model, state, &motion);
     for _ in 0..p.iterations {
         project(model, state, paper, p);
@@ -224,7 +252,8 @@ fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, h: f64) {
         for e in rod.elements() {
             // The inverse of the prediction, but for the length of the quaternion.
             let turn = state.orientation[e] * scratch.start_frame[e].conjugate();
-            state.angular_velocity[e] = DVec3::new(turn.x, turn.y, turn.z) * (2.0_f64.copysign(turn.w) * keep_angular / h);
+            state.angular_velocity[e] =
+                DVec3::new(turn.x, turn.y, turn.z) * (2.0_f64.copysign(turn.w) * keep_angular / h);
         }
     }
     state.tension.fill(0.0);

@@ -1,12 +1,14 @@
-//! Vectors and quaternions of numbers, or of as many numbers as a register has lanes: a constraint is written once, and projected alone or several at a time with
-//! the same bits, on every machine.
+//! Vectors and quaternions of numbers, or of as many numbers as a register has lanes: a constraint is written once, and
+//! projected alone or several at a time with the same bits, on every machine.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use glam::{DQuat, DVec3};
 use wide::f64x2;
 
 /// A number, or one in each lane.
-pub(super) trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self> {
+pub(super) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
+{
     const LANES: usize;
     fn each(of_lane: impl Fn(usize) -> f64) -> Self;
     fn lane(self, k: usize) -> f64;
@@ -113,7 +115,12 @@ impl<T: Number> Vec3<T> {
 impl<T: Number> Quat<T> {
     #[inline(always)]
     pub fn each(of_lane: impl Fn(usize) -> Quat<f64>) -> Self {
-        Quat { x: T::each(|k| of_lane(k).x), y: T::each(|k| of_lane(k).y), z: T::each(|k| of_lane(k).z), w: T::each(|k| of_lane(k).w) }
+        Quat {
+            x: T::each(|k| of_lane(k).x),
+            y: T::each(|k| of_lane(k).y),
+            z: T::each(|k| of_lane(k).z),
+            w: T::each(|k| of_lane(k).w),
+        }
     }
     /// Every other of these, one a lane.
     #[inline(always)]

@@ -1,9 +1,11 @@
 //! One projection of all shear and stretch of a thread, then of all bend and twist, in one of two orders.
 //!
-//! *Natural*: along the thread, each constraint after its neighbor, the published order. A joint needs two frames that are done with shear and stretch and the joint
-//! before it, so it may follow the elements at some distance: one loop over both, in which the processor has two chains to work on, with the same bits.
+//! *Natural*: along the thread, each constraint after its neighbor, the published order. A joint needs two frames that
+//! are done with shear and stretch and the joint before it, so it may follow the elements at some distance: one loop
+//! over both, in which the processor has two chains to work on, with the same bits.
 //!
-//! *Two-color*: every other constraint, then those between. Those of a color do not touch each other, so several are projected in the lanes of a register.
+//! *Two-color*: every other constraint, then those between. Those of a color do not touch each other, so several are
+//! projected in the lanes of a register.
 
 use super::constraints::{BendTwist, StretchShear};
 use super::number::{Number, Quat, Vec3};
@@ -46,7 +48,8 @@ impl Sweep {
         if order == SweepOrder::TwoColor {
             // At the end of all threads lanes have nothing to hold, and are not used.
             let of_lane = |e: usize, k: usize| (e + 2 * k).min(self.stretch.len() - 1);
-            self.stretch_lanes.extend((0..self.stretch.len()).map(|e| StretchShear::each(|k| self.stretch[of_lane(e, k)])));
+            self.stretch_lanes
+                .extend((0..self.stretch.len()).map(|e| StretchShear::each(|k| self.stretch[of_lane(e, k)])));
             self.joint_lanes.extend((0..self.joint.len()).map(|e| BendTwist::each(|k| self.joint[of_lane(e, k)])));
         }
     }
@@ -54,10 +57,17 @@ impl Sweep {
     /// One projection of the thread with these elements, which the state is of.
     pub fn project(&self, order: SweepOrder, elements: core::ops::Range<usize>, x: &mut [DVec3], q: &mut [DQuat]) {
         let n = elements.len();
-        let mut thread = Thread { stretch: &self.stretch[elements.clone()], joint: &self.joint[elements.clone()], x: &mut x[..=n], q: &mut q[..n] };
+        let mut thread = Thread {
+            stretch: &self.stretch[elements.clone()],
+            joint: &self.joint[elements.clone()],
+            x: &mut x[..=n],
+            q: &mut q[..n],
+        };
         match order {
             SweepOrder::Natural => thread.natural(),
-            SweepOrder::TwoColor => thread.two_color(&self.stretch_lanes[elements.clone()], &self.joint_lanes[elements]),
+            SweepOrder::TwoColor => {
+                thread.two_color(&self.stretch_lanes[elements.clone()], &self.joint_lanes[elements])
+            }
         }
     }
 }
@@ -153,12 +163,14 @@ mod tests {
         let weight = |i: usize| if i % 7 == 3 { 0.0 } else { 1.0 + 0.5 * s(i, 2.1) };
         let constraint = |e: usize| {
             let rest = exp(DVec3::new(0.2 * s(e, 0.3), 0.1, -0.3 * s(e, 1.1)));
-            let stretch = StretchShear::new(1.0 + 0.2 * s(e, 0.9), [weight(e), weight(e + 1)], 0.3 * weight(e + 2), 0.9);
+            let stretch =
+                StretchShear::new(1.0 + 0.2 * s(e, 0.9), [weight(e), weight(e + 1)], 0.3 * weight(e + 2), 0.9);
             (stretch, BendTwist::new(rest, [weight(e + 1), weight(e + 2)], DVec3::new(0.5, 0.6, 0.8)))
         };
         let place = |i: usize| DVec3::new(i as f64, 0.3 * s(i, 1.3), 0.2 * s(i, 0.7));
         // Every fifth quaternion has the other sign.
-        let frame = |e: usize| exp(DVec3::new(0.4 * s(e, 0.8), 1.5, 0.3 * s(e, 1.9))) * if e % 5 == 2 { -1.0 } else { 1.0 };
+        let frame =
+            |e: usize| exp(DVec3::new(0.4 * s(e, 0.8), 1.5, 0.3 * s(e, 1.9))) * if e % 5 == 2 { -1.0 } else { 1.0 };
         ((0..n).map(constraint).collect(), (0..n).map(place).collect(), (0..n).map(frame).collect())
     }
 
@@ -179,8 +191,8 @@ mod tests {
         }
     }
 
-    /// What is fused or in lanes is that which comes of one constraint after the other: of two colors to the bit, in natural order, where a frame is scaled at another
-    /// place, to rounding.
+    /// What is fused or in lanes is that which comes of one constraint after the other: of two colors to the bit, in
+    /// natural order, where a frame is scaled at another place, to rounding.
     #[test]
     fn all_at_once_is_one_by_one() {
         let sizes = [1, 2, 3, 4, 5, 6, 7, 8, 9, 40, 41];

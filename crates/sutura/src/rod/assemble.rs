@@ -37,7 +37,14 @@ fn is_flat(model: &Model, first: usize) -> bool {
     model.rods.at(model.rod_of[first]).is_some_and(|rod| rod.flat)
 }
 
-fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian, rod: Range<usize>) {
+fn assemble_rod<const FLAT: bool>(
+    model: &Model,
+    state: &State,
+    scratch: &mut Scratch,
+    h: f64,
+    hessian: Hessian,
+    rod: Range<usize>,
+) {
     let last = rod.end - 1;
     let half = (last - rod.start) / 2;
     let middle = rod.start + half;
@@ -67,8 +74,16 @@ fn assemble_rod<const FLAT: bool>(model: &Model, state: &State, scratch: &mut Sc
     at.last_block(scratch, &carry);
 }
 
-/// The residual and the Hessian without the clamps of the blocks `held` of a rod, with the tensions that are in `scratch`.
-pub(crate) fn assemble_blocks(model: &Model, state: &State, scratch: &mut Scratch, h: f64, rod: &Range<usize>, held: Range<usize>) {
+/// The residual and the Hessian without the clamps of the blocks `held` of a rod, with the tensions that are in
+/// `scratch`.
+pub(crate) fn assemble_blocks(
+    model: &Model,
+    state: &State,
+    scratch: &mut Scratch,
+    h: f64,
+    rod: &Range<usize>,
+    held: Range<usize>,
+) {
     let last = rod.end - 1;
     let at = At::<true> {
         model,
@@ -101,8 +116,8 @@ pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch) {
     }
 }
 
-/// What the element and the joint before a block add to it: force on the element's first particle and moment on the joint's first frame, with
-/// their second derivatives.
+/// What the element and the joint before a block add to it: force on the element's first particle and moment on the
+/// joint's first frame, with their second derivatives.
 struct Carry {
     force: Vec2,
     kx: Sym2,
@@ -116,7 +131,12 @@ impl Carry {
         Carry { force: zero, kx: Sym2::scalar(lanes(0.0, 0.0)), moment: zero, kt: Sym2::scalar(lanes(0.0, 0.0)) }
     }
     fn scaled(&self, k: f64x2) -> Self {
-        Carry { force: self.force.scaled(k), kx: self.kx.scaled(k), moment: self.moment.scaled(k), kt: self.kt.scaled(k) }
+        Carry {
+            force: self.force.scaled(k),
+            kx: self.kx.scaled(k),
+            moment: self.moment.scaled(k),
+            kt: self.kt.scaled(k),
+        }
     }
     /// The high lane in both.
     fn high(&self) -> Self {
@@ -172,9 +192,14 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let (moment, kt) = self.joint(scratch, low + 1, high + 1);
         let (model, state) = (self.model, self.state);
         let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2 * scratch.heavier[0]);
-        let off = Vec2::load(scratch.target[low], scratch.target[high]).less(&Vec2::load(state.position[low], state.position[high]));
-        let push = Vec2::load(scratch.force[low], scratch.force[high]).plus(&off, w).less(&before.force).add(&own.force);
-        let torque = Vec2::load(scratch.torque[low], scratch.torque[high]).add(&inertial).add(&own.torque).add(&moment.less(&before.moment));
+        let off = Vec2::load(scratch.target[low], scratch.target[high])
+            .less(&Vec2::load(state.position[low], state.position[high]));
+        let push =
+            Vec2::load(scratch.force[low], scratch.force[high]).plus(&off, w).less(&before.force).add(&own.force);
+        let torque = Vec2::load(scratch.torque[low], scratch.torque[high])
+            .add(&inertial)
+            .add(&own.torque)
+            .add(&moment.less(&before.moment));
         let none = Vec2::load(DVec3::ZERO, DVec3::ZERO);
         let half = if self.exact { moment.scaled(f64x2::splat(0.5)) } else { none };
         (scratch.moment[low + 1], scratch.moment[high + 1]) = moment.split();
@@ -213,7 +238,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
             system.next[node] = DMat3::ZERO;
             system.after[node] = DMat3::ZERO;
         }
-        scratch.rhs[2 * e] = (scratch.target[e] - self.state.position[e]) * w + scratch.force[e] - before.force.split().1;
+        scratch.rhs[2 * e] =
+            (scratch.target[e] - self.state.position[e]) * w + scratch.force[e] - before.force.split().1;
         scratch.rhs[2 * e + 1] = DVec3::ZERO;
     }
 
@@ -252,8 +278,9 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let of_strain = c * (stretched - l) + lanes(p0, p1);
         let pull = if self.given { tension } else { of_strain + tied * (tension - of_strain) };
         let force = d.plus(&t, -along).scaled(a).plus(&line, pull);
-        // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative is
-        // f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation across.
+        // Geometric stiffness. On motions that keep the element's length and shear, u = phi x d, the second derivative
+        // is f.d phi^2 - (phi.f)(phi.d): the tension acts on positions, the shear force couples twist with rotation
+        // across.
         let g = if self.exact { lanes(t0, t1) } else { lanes(t0.max(0.0), t1.max(0.0)) } / l;
         // With n = t x d: R K R^T [d]x = a [d]x + b t n^T, and [d]x^T R K R^T [d]x = a (d^2 I - d d^T) + b n n^T.
         let n = t.cross(&d);
@@ -280,15 +307,16 @@ impl<const FLAT: bool> At<'_, FLAT> {
         Element { axis: t, force, torque: d.cross(&force), kx, kd, kt, line, give, off }
     }
 
-    /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the latter with the frame
-    /// (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
+    /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the
+    /// latter with the frame (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
     #[inline(always)]
     fn spin(&self, scratch: &Scratch, low: usize, high: usize, t: &Vec2) -> (Vec2, Sym2) {
         let q = &self.state.orientation;
         let inv_h2 = self.inv_h2 * scratch.heavier[1];
         let (i0, i1) = (self.model.inertia[low] * inv_h2, self.model.inertia[high] * inv_h2);
         let (x, z) = (lanes(i0.x, i1.x), lanes(i0.z, i1.z) - lanes(i0.x, i1.x));
-        let turn = Quat2::load(scratch.target_frame[low], scratch.target_frame[high]).times(&Quat2::load(q[low], q[high]).conjugate());
+        let turn = Quat2::load(scratch.target_frame[low], scratch.target_frame[high])
+            .times(&Quat2::load(q[low], q[high]).conjugate());
         let (u0, u1) = turn.split();
         let off = Vec2::load(log(u0), log(u1));
         let mut torque = off.scaled(x).plus(t, z * t.dot(&off));
@@ -303,8 +331,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
         (torque, inertia)
     }
 
-    /// Moments that the joints before two elements exert on the frames before them, and the stiffness against relative rotation; none where
-    /// there is no joint.
+    /// Moments that the joints before two elements exert on the frames before them, and the stiffness against relative
+    /// rotation; none where there is no joint.
     #[inline(always)]
     fn joint(&self, scratch: &Scratch, low: usize, high: usize) -> (Vec2, Sym2) {
         let (model, state) = (self.model, self.state);
@@ -315,13 +343,25 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let (k0, k1) = (model.bend_stiffness[low] * on(low), model.bend_stiffness[high] * on(high));
         let gamma = lanes(model.bend_damping[low], model.bend_damping[high]) * f64x2::splat(self.inv_h);
         let plastic = Vec2::load(state.plastic[low], state.plastic[high]);
-        joint_terms::<FLAT>(&j, &plastic, &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]), &Vec2::load(k0, k1), gamma)
+        joint_terms::<FLAT>(
+            &j,
+            &plastic,
+            &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]),
+            &Vec2::load(k0, k1),
+            gamma,
+        )
     }
 }
 
 /// Moments in world axes that joints exert on their first frames, and the stiffness against relative rotation.
 #[inline(always)]
-fn joint_terms<const FLAT: bool>(j: &strain::Joints, plastic: &Vec2, start: &Vec2, stiffness: &Vec2, gamma: f64x2) -> (Vec2, Sym2) {
+fn joint_terms<const FLAT: bool>(
+    j: &strain::Joints,
+    plastic: &Vec2,
+    start: &Vec2,
+    stiffness: &Vec2,
+    gamma: f64x2,
+) -> (Vec2, Sym2) {
     let one = f64x2::splat(1.0);
     let moment = j.angle.less(plastic).plus(&j.angle.less(start), gamma).times(stiffness);
     let (bend, twist) = (stiffness.x * (one + gamma), stiffness.z * (one + gamma));
@@ -346,7 +386,8 @@ pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat) -> (DVec3, DMat3) {
     let (q0, q1) = if c.first { (c.orientation, q) } else { (q, c.orientation) };
     let j = strain::joints([q0; 2], [q1; 2], [c.rest_half; 2]);
     let twice = |v: DVec3| Vec2::load(v, v);
-    let (moment, b) = joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping));
+    let (moment, b) =
+        joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping));
     (moment.split().0, b.split().0)
 }
 
@@ -381,7 +422,11 @@ mod tests {
         let mut seed = 7;
         let n = 5;
         let mut world = World::default();
-        let spec = RodSpec { section, stretch, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0)) };
+        let spec = RodSpec {
+            section,
+            stretch,
+            ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, n, 2e-3, Material::elastic(1e6, 1000.0))
+        };
         world.insert_rod(&spec).unwrap();
         let (model, mut state) = world.into_parts();
         for i in 0..=n {

@@ -1,5 +1,6 @@
-//! Brakes of reels: the last element of a thread carries no more than a given tension; what would stretch it more comes off the reel. Within a
-//! substep it is perfectly plastic, with tension K C3 up to the limit and the limit beyond; afterwards its rest length takes the excess.
+//! Brakes of reels: the last element of a thread carries no more than a given tension; what would stretch it more comes
+//! off the reel. Within a substep it is perfectly plastic, with tension K C3 up to the limit and the limit beyond;
+//! afterwards its rest length takes the excess.
 
 use crate::math::outer;
 use crate::model::Model;
@@ -30,7 +31,8 @@ impl Brake {
     pub fn paid(&self, model: &Model, state: &State) -> f64 {
         let (e, l) = (self.element, model.rest_length[self.element]);
         // Stretched by limit / EA it is as long as it is now.
-        let at_limit = (l + element_strain(model, state, e).z) / (1.0 + self.limit / (model.stretch_stiffness[e].z * l));
+        let at_limit =
+            (l + element_strain(model, state, e).z) / (1.0 + self.limit / (model.stretch_stiffness[e].z * l));
         if self.slips { (at_limit - l).max(0.0) } else { 0.0 }
     }
 }
@@ -62,8 +64,8 @@ pub(crate) fn settled(model: &Model, state: &State, brakes: &[Brake]) -> bool {
     })
 }
 
-/// Takes the axial stiffness of what slips out of the assembled system and makes its tension the limit. With C3 = t . (x1 - x0) - l and n = t x d,
-/// its derivative is -t, n, t on x0, the frame and x1.
+/// Takes the axial stiffness of what slips out of the assembled system and makes its tension the limit. With C3 = t .
+/// (x1 - x0) - l and n = t x d, its derivative is -t, n, t on x0, the frame and x1.
 pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { brakes, system, rhs, .. } = scratch;
     for b in brakes.iter().filter(|b| b.slips) {

@@ -1,15 +1,17 @@
 //! The linear system of a rod and its direct solution.
 //!
-//! The unknowns of a rod, ordered x_0, theta_0, x_1, theta_1, ... in nodes of three, couple each node to the next two only:
-//! x_i to theta_i and x_{i+1}, theta_i to x_{i+1} and theta_{i+1}. The matrix is symmetric positive definite and block
-//! pentadiagonal with 3x3 blocks. It is factored as L D L^T without square roots, each 3x3 pivot as l d l^T (a pivot's closed-form
-//! inverse would lose all digits: stretch is 1e8 times stiffer than the rest).
+//! The unknowns of a rod, ordered x_0, theta_0, x_1, theta_1, ... in nodes of three, couple each node to the next two
+//! only: x_i to theta_i and x_{i+1}, theta_i to x_{i+1} and theta_{i+1}. The matrix is symmetric positive definite and
+//! block pentadiagonal with 3x3 blocks. It is factored as L D L^T without square roots, each 3x3 pivot as l d l^T (a
+//! pivot's closed-form inverse would lose all digits: stretch is 1e8 times stiffer than the rest).
 //!
-//! The tension of an inextensible element is an unknown besides, eliminated between its two particles: as a stiffness in their blocks it would take the
-//! digits of masses with it, which are 1e-13 of it. The matrix is quasi-definite then, and any order of elimination is stable [Vanderbei 1995].
+//! The tension of an inextensible element is an unknown besides, eliminated between its two particles: as a stiffness
+//! in their blocks it would take the digits of masses with it, which are 1e-13 of it. The matrix is quasi-definite
+//! then, and any order of elimination is stable [Vanderbei 1995].
 //!
-//! Elimination runs from both ends of a rod toward a zone of blocks `[lo, hi]` (a block is x_i with theta_i) and then through the
-//! zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone alone.
+//! Elimination runs from both ends of a rod toward a zone of blocks `[lo, hi]` (a block is x_i with theta_i) and then
+//! through the zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone
+//! alone.
 
 use crate::math::outer;
 use crate::rod::lanes::{Vec2, lanes};
@@ -132,8 +134,9 @@ impl Block {
     }
 }
 
-/// A multiplier of an element with what it couples to: the tension of an inextensible one. Its own entry is minus its compliance, so it
-/// takes the sign of a pivot with it but no digits, however small the compliance is. It is eliminated after the first of the element's particles.
+/// A multiplier of an element with what it couples to: the tension of an inextensible one. Its own entry is minus its
+/// compliance, so it takes the sign of a pivot with it but no digits, however small the compliance is. It is eliminated
+/// after the first of the element's particles.
 #[derive(Debug, Clone, Copy, Default)]
 struct Link {
     /// `l^-1` of its coupling to that particle.
@@ -174,7 +177,8 @@ pub(crate) struct System {
     pub after: Vec<DMat3>,
     /// Whether a block is one of a rod whose elements have multipliers.
     pub tied: Vec<bool>,
-    /// Coupling of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has none.
+    /// Coupling of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has
+    /// none.
     pub ties: Vec<([DVec3; 2], f64)>,
     /// Right side of each multiplier's row.
     pub right: Vec<f64>,
@@ -200,8 +204,8 @@ impl System {
         self.transfer.resize(n_particles, Block::default());
     }
 
-    /// Takes a node out of the system: its unknown becomes zero times `1 - keep`, where `keep` projects on the free directions. What is taken out
-    /// is as stiff as the rest, so that rounding is the same at any scale.
+    /// Takes a node out of the system: its unknown becomes zero times `1 - keep`, where `keep` projects on the free
+    /// directions. What is taken out is as stiff as the rest, so that rounding is the same at any scale.
     pub fn restrict(&mut self, node: usize, keep: DMat3) {
         let d = &self.diagonal[node];
         let size = d.x_axis.x.abs().max(d.y_axis.y.abs()).max(d.z_axis.z.abs());
@@ -229,7 +233,8 @@ impl System {
         (k.is_multiple_of(2) && self.tied[k / 2]).then(|| if up { k / 2 } else { k / 2 - 1 })
     }
 
-    /// Factors the rod whose blocks are `blocks`; the zone must lie within. False when the matrix is not positive definite.
+    /// Factors the rod whose blocks are `blocks`; the zone must lie within. False when the matrix is not positive
+    /// definite.
     pub fn factor(&mut self, blocks: Range<usize>, zone: &Range<usize>) -> bool {
         let (both, top) = (both(&blocks, zone), self.top(&blocks, zone));
         if top < 2 * blocks.end {
@@ -260,14 +265,15 @@ impl System {
         self.pivots[2 * blocks.start..2 * blocks.end].iter().all(|p| p.inv.min_element() > 0.0)
     }
 
-    /// End of the nodes that are eliminated downward. The last frame of a rod, which is no element's, couples to nothing: where there are multipliers it is
-    /// left out, so that the two ends come to their particles at the same time.
+    /// End of the nodes that are eliminated downward. The last frame of a rod, which is no element's, couples to
+    /// nothing: where there are multipliers it is left out, so that the two ends come to their particles at the same
+    /// time.
     fn top(&self, blocks: &Range<usize>, zone: &Range<usize>) -> usize {
         2 * blocks.end - usize::from(self.tied[blocks.start] && zone.end < blocks.end)
     }
 
-    /// Eliminates `count` nodes from `low` on toward higher nodes and as many from `high` on toward lower ones, one of each at a time in the
-    /// two lanes of a vector: each end's nodes wait for one another, the two ends do not.
+    /// Eliminates `count` nodes from `low` on toward higher nodes and as many from `high` on toward lower ones, one of
+    /// each at a time in the two lanes of a vector: each end's nodes wait for one another, the two ends do not.
     fn eliminate_both<const TIED: bool>(&mut self, low: usize, high: usize, count: usize) {
         if count == 0 {
             return;
@@ -336,7 +342,8 @@ impl System {
         self.pivots[k] = p;
     }
 
-    /// Eliminates node `k` toward lower nodes. The scaled couplings replace `next[k - 1]` and `after[k - 2]`, transposed.
+    /// Eliminates node `k` toward lower nodes. The scaled couplings replace `next[k - 1]` and `after[k - 2]`,
+    /// transposed.
     #[inline(always)]
     fn eliminate_down(&mut self, k: usize) {
         let p = Pivot::new(&self.diagonal[k]);
@@ -359,7 +366,8 @@ impl System {
         self.pivots[k] = p;
     }
 
-    /// Solves for one right side of the rod, in place, that of the multipliers being zero. `factor` must have run with the same ranges.
+    /// Solves for one right side of the rod, in place, that of the multipliers being zero. `factor` must have run with
+    /// the same ranges.
     pub fn solve(&self, blocks: Range<usize>, zone: &Range<usize>, z: &mut [DVec3]) {
         self.solve_part(blocks, zone, z, 0.0);
     }
@@ -397,12 +405,16 @@ impl System {
         z[k] = p.upper(z[k] - (self.next[k] * z[k + 1]) * p.inv);
         for k in (first + both..hi - 2).rev() {
             let p = &self.pivots[k];
-            let tied = self.tie(k, true).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k + 1], z[k + 2]));
+            let tied = self
+                .tie(k, true)
+                .map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k + 1], z[k + 2]));
             z[k] = p.upper(z[k] - (self.next[k] * z[k + 1] + self.after[k] * z[k + 2]) * p.inv - tied);
         }
         for k in hi..top - both {
             let p = &self.pivots[k];
-            let tied = self.tie(k, false).map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k - 1], z[k - 2]));
+            let tied = self
+                .tie(k, false)
+                .map_or(DVec3::ZERO, |e| self.links[e].back(p, z[k], part * self.right[e], z[k - 1], z[k - 2]));
             z[k] = p.upper(z[k] - (self.next[k - 1] * z[k - 1] + self.after[k - 2] * z[k - 2]) * p.inv - tied);
         }
         if self.tied[blocks.start] {
@@ -499,8 +511,8 @@ impl System {
         }
     }
 
-    /// Inverse of the matrix at the zone's diagonal blocks, and the transfers between neighboring ones (Takahashi's recursion):
-    /// X_ii = D_i^-1 + K_i X_{i+1,i+1} K_i^T, X_ij = -K_i X_{i+1,j} for i < j.
+    /// Inverse of the matrix at the zone's diagonal blocks, and the transfers between neighboring ones (Takahashi's
+    /// recursion): X_ii = D_i^-1 + K_i X_{i+1,i+1} K_i^T, X_ij = -K_i X_{i+1,j} for i < j.
     pub fn invert_zone(&mut self, zone: &Range<usize>) {
         for i in zone.clone().rev() {
             let (px, pt) = (self.pivots[2 * i], self.pivots[2 * i + 1]);
@@ -534,11 +546,17 @@ impl System {
         }
     }
 
-    /// The matrix at zone block `i` and from it to the next, as left by the elimination of what is before it in the zone and beyond the zone.
+    /// The matrix at zone block `i` and from it to the next, as left by the elimination of what is before it in the
+    /// zone and beyond the zone.
     pub fn zone_block(&self, i: usize) -> (Block, Block) {
         let (px, pt) = (&self.pivots[2 * i], &self.pivots[2 * i + 1]);
         let w = &self.next[2 * i];
-        let own = Block { xx: px.whole(), xt: px.times_lower(w), tx: DMat3::ZERO, tt: pt.whole() + t_mul(w, &scale_rows(w, px.inv)) };
+        let own = Block {
+            xx: px.whole(),
+            xt: px.times_lower(w),
+            tx: DMat3::ZERO,
+            tt: pt.whole() + t_mul(w, &scale_rows(w, px.inv)),
+        };
         let v = &self.after[2 * i];
         let to = Block {
             xx: px.times_lower(v),
@@ -564,8 +582,8 @@ fn t_vec(a: &DMat3, v: DVec3) -> DVec3 {
     DVec3::new(a.x_axis.dot(v), a.y_axis.dot(v), a.z_axis.dot(v))
 }
 
-/// How many nodes are eliminated from each end at the same time. The two ends must not touch the same nodes, so the last two before the
-/// zone are left to be eliminated one by one.
+/// How many nodes are eliminated from each end at the same time. The two ends must not touch the same nodes, so the
+/// last two before the zone are left to be eliminated one by one.
 fn both(blocks: &Range<usize>, zone: &Range<usize>) -> usize {
     (2 * (zone.start - blocks.start).min(blocks.end - zone.end)).saturating_sub(2)
 }
@@ -587,12 +605,19 @@ struct Mat2 {
 impl Mat2 {
     #[inline(always)]
     fn pair(low: &DMat3, high: &DMat3) -> Self {
-        Mat2 { cols: [Vec2::load(low.x_axis, high.x_axis), Vec2::load(low.y_axis, high.y_axis), Vec2::load(low.z_axis, high.z_axis)] }
+        Mat2 {
+            cols: [
+                Vec2::load(low.x_axis, high.x_axis),
+                Vec2::load(low.y_axis, high.y_axis),
+                Vec2::load(low.z_axis, high.z_axis),
+            ],
+        }
     }
     /// The coupling of a node to a higher one, and, transposed, that of a node to a lower one.
     #[inline(always)]
     fn load(low: &DMat3, high: &DMat3) -> Self {
-        let row = |l: DVec3, h0: f64, h1: f64, h2: f64| Vec2 { x: lanes(l.x, h0), y: lanes(l.y, h1), z: lanes(l.z, h2) };
+        let row =
+            |l: DVec3, h0: f64, h1: f64, h2: f64| Vec2 { x: lanes(l.x, h0), y: lanes(l.y, h1), z: lanes(l.z, h2) };
         Mat2 {
             cols: [
                 row(low.x_axis, high.x_axis.x, high.y_axis.x, high.z_axis.x),
@@ -604,8 +629,16 @@ impl Mat2 {
     /// Two symmetric matrices.
     #[inline(always)]
     fn symmetric(low: &DMat3, high: &DMat3) -> Self {
-        let (xx, yy, zz) = (lanes(low.x_axis.x, high.x_axis.x), lanes(low.y_axis.y, high.y_axis.y), lanes(low.z_axis.z, high.z_axis.z));
-        let (xy, xz, yz) = (lanes(low.x_axis.y, high.x_axis.y), lanes(low.x_axis.z, high.x_axis.z), lanes(low.y_axis.z, high.y_axis.z));
+        let (xx, yy, zz) = (
+            lanes(low.x_axis.x, high.x_axis.x),
+            lanes(low.y_axis.y, high.y_axis.y),
+            lanes(low.z_axis.z, high.z_axis.z),
+        );
+        let (xy, xz, yz) = (
+            lanes(low.x_axis.y, high.x_axis.y),
+            lanes(low.x_axis.z, high.x_axis.z),
+            lanes(low.y_axis.z, high.y_axis.z),
+        );
         Mat2 { cols: [Vec2 { x: xx, y: xy, z: xz }, Vec2 { x: xy, y: yy, z: yz }, Vec2 { x: xz, y: yz, z: zz }] }
     }
     #[inline(always)]
@@ -621,7 +654,11 @@ impl Mat2 {
     #[inline(always)]
     fn times(&self, v: &Vec2) -> Vec2 {
         let [a, b, c] = &self.cols;
-        Vec2 { x: a.x * v.x + b.x * v.y + c.x * v.z, y: a.y * v.x + b.y * v.y + c.y * v.z, z: a.z * v.x + b.z * v.y + c.z * v.z }
+        Vec2 {
+            x: a.x * v.x + b.x * v.y + c.x * v.z,
+            y: a.y * v.x + b.y * v.y + c.y * v.z,
+            z: a.z * v.x + b.z * v.y + c.z * v.z,
+        }
     }
     /// `self + a b^T`.
     #[inline(always)]
@@ -691,12 +728,20 @@ impl Pivot2 {
     }
     #[inline(always)]
     fn join(low: &Pivot, high: &Pivot) -> Self {
-        Pivot2 { l10: lanes(low.l10, high.l10), l20: lanes(low.l20, high.l20), l21: lanes(low.l21, high.l21), inv: Vec2::load(low.inv, high.inv) }
+        Pivot2 {
+            l10: lanes(low.l10, high.l10),
+            l20: lanes(low.l20, high.l20),
+            l21: lanes(low.l21, high.l21),
+            inv: Vec2::load(low.inv, high.inv),
+        }
     }
     #[inline(always)]
     fn split(&self) -> (Pivot, Pivot) {
         let (l10, l20, l21, inv) = (self.l10.to_array(), self.l20.to_array(), self.l21.to_array(), self.inv.split());
-        (Pivot { l10: l10[0], l20: l20[0], l21: l21[0], inv: inv.0 }, Pivot { l10: l10[1], l20: l20[1], l21: l21[1], inv: inv.1 })
+        (
+            Pivot { l10: l10[0], l20: l20[0], l21: l21[0], inv: inv.0 },
+            Pivot { l10: l10[1], l20: l20[1], l21: l21[1], inv: inv.1 },
+        )
     }
     #[inline(always)]
     fn lower(&self, v: &Vec2) -> Vec2 {
@@ -853,7 +898,10 @@ pub(crate) mod tests {
                         (x, t) = (-(k.xx * x + k.xt * t), -(k.tx * x + k.tt * t));
                     }
                     let scale = z[2 * i].length().max(z[2 * i + 1].length());
-                    assert!((x - z[2 * i]).length() < 1e-8 * scale && (t - z[2 * i + 1]).length() < 1e-8 * scale, "block {i},{j}");
+                    assert!(
+                        (x - z[2 * i]).length() < 1e-8 * scale && (t - z[2 * i + 1]).length() < 1e-8 * scale,
+                        "block {i},{j}"
+                    );
                 }
             }
         }

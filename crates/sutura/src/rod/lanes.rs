@@ -1,4 +1,5 @@
-//! Two of everything in the lanes of a vector register: the same arithmetic on two elements at a time, with the same bits on every machine.
+//! Two of everything in the lanes of a vector register: the same arithmetic on two elements at a time, with the same
+//! bits on every machine.
 
 use glam::{DMat3, DQuat, DVec3};
 use wide::f64x2;
@@ -67,7 +68,10 @@ pub(crate) struct Quat2 {
 impl Quat2 {
     #[inline(always)]
     pub fn load(low: DQuat, high: DQuat) -> Self {
-        Quat2 { v: Vec2 { x: lanes(low.x, high.x), y: lanes(low.y, high.y), z: lanes(low.z, high.z) }, w: lanes(low.w, high.w) }
+        Quat2 {
+            v: Vec2 { x: lanes(low.x, high.x), y: lanes(low.y, high.y), z: lanes(low.z, high.z) },
+            w: lanes(low.w, high.w),
+        }
     }
     #[inline(always)]
     pub fn split(&self) -> (DQuat, DQuat) {
@@ -137,7 +141,14 @@ impl Sym2 {
     }
     #[inline(always)]
     pub fn add(&self, o: &Sym2) -> Self {
-        Sym2 { xx: self.xx + o.xx, yy: self.yy + o.yy, zz: self.zz + o.zz, xy: self.xy + o.xy, xz: self.xz + o.xz, yz: self.yz + o.yz }
+        Sym2 {
+            xx: self.xx + o.xx,
+            yy: self.yy + o.yy,
+            zz: self.zz + o.zz,
+            xy: self.xy + o.xy,
+            xz: self.xz + o.xz,
+            yz: self.yz + o.yz,
+        }
     }
     #[inline(always)]
     pub fn scaled(&self, k: f64x2) -> Self {
@@ -145,7 +156,11 @@ impl Sym2 {
     }
     #[inline(always)]
     pub fn split(&self) -> (DMat3, DMat3) {
-        join([Vec2 { x: self.xx, y: self.xy, z: self.xz }, Vec2 { x: self.xy, y: self.yy, z: self.yz }, Vec2 { x: self.xz, y: self.yz, z: self.zz }])
+        join([
+            Vec2 { x: self.xx, y: self.xy, z: self.xz },
+            Vec2 { x: self.xy, y: self.yy, z: self.yz },
+            Vec2 { x: self.xz, y: self.yz, z: self.zz },
+        ])
     }
     /// `[v]x - self`.
     #[inline(always)]

@@ -13,7 +13,8 @@ use crate::state::{GripState, State};
 use crate::view::Energy;
 use glam::DVec3;
 
-/// Stretch and shear of element `e` along its directors \[m\]. The stretch of an inextensible one is that of the line between its ends.
+/// Stretch and shear of element `e` along its directors \[m\]. The stretch of an inextensible one is that of the line
+/// between its ends.
 #[inline]
 pub(crate) fn element_strain(model: &Model, state: &State, e: usize) -> DVec3 {
     let d = state.position[e + 1] - state.position[e];
@@ -35,31 +36,40 @@ pub(crate) fn joint_angle(model: &Model, state: &State, e: usize) -> DVec3 {
     strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]) - state.plastic[e]
 }
 
-/// Elastic angles of the two half joints by which a rod goes on through a weld, as it is at particle `e` (the first or last of a closed rod), and
-/// their stiffness.
-pub(crate) fn welded_joint(model: &Model, state: &State, rod: &RodModel, e: usize) -> impl Iterator<Item = (DVec3, DVec3)> {
+/// Elastic angles of the two half joints by which a rod goes on through a weld, as it is at particle `e` (the first or
+/// last of a closed rod), and their stiffness.
+pub(crate) fn welded_joint(
+    model: &Model,
+    state: &State,
+    rod: &RodModel,
+    e: usize,
+) -> impl Iterator<Item = (DVec3, DVec3)> {
     let slot = model.weld_of[e];
     let weld = slot.and_then(|s| model.welds.at(s));
     let halves = weld.into_iter().flat_map(|w| w.halves(model)).filter(|half| rod.elements().contains(&half.frame));
     halves.map(move |half| {
-        let (q, node) = (state.orientation[half.frame], state.weld_orientation[slot.expect("there is a weld") as usize]);
+        let (q, node) =
+            (state.orientation[half.frame], state.weld_orientation[slot.expect("there is a weld") as usize]);
         (half.angle(node, q), model.section[half.frame].bend / (0.5 * model.rest_length[half.frame]))
     })
 }
 
-/// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending and twist add no more
-/// than a stiffness times the square of half a turn.) So is the square of every distance.
+/// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending
+/// and twist add no more than a stiffness times the square of half a turn.) So is the square of every distance.
 pub(crate) fn in_proportion(model: &Model, state: &State) -> bool {
     let (mut sum, mut squares) = (0.0, 0.0);
     for (_, rod) in model.rods.iter() {
         for i in rod.particles() {
             squares += state.position[i].length_squared();
-            sum += model.mass[i] * (state.velocity[i].length_squared() + model.settings.gravity.dot(state.position[i]).abs());
+            sum += model.mass[i]
+                * (state.velocity[i].length_squared() + model.settings.gravity.dot(state.position[i]).abs());
         }
         for e in rod.elements() {
             let c = element_strain(model, state, e);
             let w = state.angular_velocity[e];
-            sum += model.inertia[e].max_element() * w.length_squared() + (model.stretch_stiffness[e] * c).dot(c) + state.tension[e].abs();
+            sum += model.inertia[e].max_element() * w.length_squared()
+                + (model.stretch_stiffness[e] * c).dot(c)
+                + state.tension[e].abs();
             sum += (model.bend_stiffness[e] * state.plastic[e]).dot(state.plastic[e]);
         }
     }
@@ -89,7 +99,9 @@ pub(crate) fn energy(model: &Model, state: &State, rod: &RodModel) -> Energy {
     // A clamp holds half a joint on each side.
     for (i, grip) in clamps(model, state, rod).filter(|(i, _)| model.weld_of[*i].is_none()) {
         let held = grip.pose.orientation;
-        for (e, first) in [(i.wrapping_sub(1), false), (i, true)].into_iter().filter(|(e, _)| rod.elements().contains(e)) {
+        for (e, first) in
+            [(i.wrapping_sub(1), false), (i, true)].into_iter().filter(|(e, _)| rod.elements().contains(e))
+        {
             let (a, b) = if first { (held, state.orientation[e]) } else { (state.orientation[e], held) };
             let angle = strain::joint_angle(a, b, grip.rest_half);
             add_joint(&mut sum, angle, model.section[e].bend / (0.5 * model.rest_length[e]));

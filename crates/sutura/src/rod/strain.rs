@@ -1,22 +1,24 @@
 //! Strains of the discrete Cosserat rod and their derivatives.
 //!
-//! Stretch and shear of an element: `C = R(q)^T (x1 - x0) - l e3` \[m\], energy `C^T K C / 2` with K = diag(kGA, kGA, EA) / l.
-//! With d = x1 - x0 and world increments dx, phi (q <- exp(phi) q), `R dC = dx1 - dx0 + d x phi`.
+//! Stretch and shear of an element: `C = R(q)^T (x1 - x0) - l e3` \[m\], energy `C^T K C / 2` with K = diag(kGA, kGA,
+//! EA) / l. With d = x1 - x0 and world increments dx, phi (q <- exp(phi) q), `R dC = dx1 - dx0 + d x phi`.
 //!
-//! Bend and twist of a joint: `theta = log(h^-1 r h^-1)` \[rad\], r = conj(q0) q1, h the square root of its rest value; energy
-//! `theta^T B theta / 2`, B = diag(E I1, E I2, GJ) / lbar. The symmetric form gives the same energy when the rod is numbered from the other end (the
-//! one-sided h^-2 r does not); the logarithm stays linear to 180 degrees. With delta = phi1 - phi0, `d theta = M(theta) Rm^T delta`,
-//! Rm = R(q0 h exp(theta/2)) the frame halfway and M = I + (a / sin a - 1) (across theta), a = |theta| / 2.
+//! Bend and twist of a joint: `theta = log(h^-1 r h^-1)` \[rad\], r = conj(q0) q1, h the square root of its rest value;
+//! energy `theta^T B theta / 2`, B = diag(E I1, E I2, GJ) / lbar. The symmetric form gives the same energy when the rod
+//! is numbered from the other end (the one-sided h^-2 r does not); the logarithm stays linear to 180 degrees. With
+//! delta = phi1 - phi0, `d theta = M(theta) Rm^T delta`, Rm = R(q0 h exp(theta/2)) the frame halfway and M = I + (a /
+//! sin a - 1) (across theta), a = |theta| / 2.
 //!
-//! Source: Kugelstadt and Schoemer 2016 (staggered frames); Deul et al. 2018 (physical compliance). The logarithm instead of 2 Im(q) and
-//! the symmetric rest are ours.
+//! Source: Kugelstadt and Schoemer 2016 (staggered frames); Deul et al. 2018 (physical compliance). The logarithm
+//! instead of 2 Im(q) and the symmetric rest are ours.
 
 use crate::math::{log, log_and_root};
 use crate::rod::lanes::{Quat2, Vec2, lanes};
 use glam::{DQuat, DVec3};
 use wide::f64x2;
 
-/// Angles of two joints along the directors halfway, and what their derivatives d theta / d (phi1 - phi0) = M Rm^T are made of.
+/// Angles of two joints along the directors halfway, and what their derivatives d theta / d (phi1 - phi0) = M Rm^T are
+/// made of.
 pub(super) struct Joints {
     /// theta \[rad\], and its square.
     pub angle: Vec2,
@@ -58,11 +60,14 @@ pub(super) fn joints(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> J
     if low < 0.0025 && high < 0.0025 {
         let k = |x: f64| f64x2::splat(x);
         // 4 atan(x) / x; the first term left out is u^7 / 15.
-        let series = one - u * (k(1.0 / 3.0) - u * (k(0.2) - u * (k(1.0 / 7.0) - u * (k(1.0 / 9.0) - u * (k(1.0 / 11.0) - u * k(1.0 / 13.0))))));
+        let series = one
+            - u * (k(1.0 / 3.0)
+                - u * (k(0.2) - u * (k(1.0 / 7.0) - u * (k(1.0 / 9.0) - u * (k(1.0 / 11.0) - u * k(1.0 / 13.0))))));
         let angle = turn.v.scaled(k(4.0) * inverse * series);
         let squared = angle.dot(&angle);
         // (a / sin a - 1) / theta^2 with a = theta / 2.
-        let c = k(1.0 / 24.0) + squared * (k(7.0 / 5760.0) + squared * (k(31.0 / 967_680.0) + squared * k(127.0 / 154_828_800.0)));
+        let c = k(1.0 / 24.0)
+            + squared * (k(7.0 / 5760.0) + squared * (k(31.0 / 967_680.0) + squared * k(127.0 / 154_828_800.0)));
         // cos^2 (a / 2) = (1 + cos a) / 2.
         let cosine = (k(0.5) + k(0.5) * turn.w).sqrt();
         let root = Quat2 { v: turn.v.scaled(k(0.5) / cosine), w: cosine };
@@ -115,7 +120,12 @@ mod tests {
                 let m = DMat3::from_diagonal(DVec3::splat(1.0 + c * squared)) - outer(angle, angle) * c;
                 let got = (m * middle.transpose()).col(axis);
                 // Forward differences of step 1e-6.
-                assert!(((up - angle) / e - got).length() < 1e-5, "size {size} axis {axis}: {:?} {:?}", (up - angle) / e, got);
+                assert!(
+                    ((up - angle) / e - got).length() < 1e-5,
+                    "size {size} axis {axis}: {:?} {:?}",
+                    (up - angle) / e,
+                    got
+                );
                 assert!(((down - angle) / e + got).length() < 1e-5);
             }
         }

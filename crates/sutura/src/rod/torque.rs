@@ -1,7 +1,7 @@
-//! Dead torques. A torque that keeps its direction in the world while its frame turns has no energy, so its Newton matrix is not
-//! symmetric: at the loaded frame it is H - [tau]x / 2 (world increments, q <- exp(phi) q). The solver's matrix is the symmetric H;
-//! this corrects its solution by the Woodbury identity, three columns a loaded frame. Without it a tip moment beyond about
-//! 5 EI / L does not converge.
+//! Dead torques. A torque that keeps its direction in the world while its frame turns has no energy, so its Newton
+//! matrix is not symmetric: at the loaded frame it is H - [tau]x / 2 (world increments, q <- exp(phi) q). The solver's
+//! matrix is the symmetric H; this corrects its solution by the Woodbury identity, three columns a loaded frame.
+//! Without it a tip moment beyond about 5 EI / L does not converge.
 
 use crate::math::skew;
 use crate::rod::factor::System;
@@ -19,7 +19,14 @@ pub(crate) struct TorqueCorrection {
 
 impl TorqueCorrection {
     /// Turns `z = H^-1 r` of the rod into `(H - sum [tau]x / 2)^-1 r`.
-    pub fn apply(&mut self, system: &System, blocks: &Range<usize>, zone: &Range<usize>, torque: &[DVec3], z: &mut [DVec3]) {
+    pub fn apply(
+        &mut self,
+        system: &System,
+        blocks: &Range<usize>,
+        zone: &Range<usize>,
+        torque: &[DVec3],
+        z: &mut [DVec3],
+    ) {
         self.nodes.clear();
         self.nodes.extend(blocks.clone().filter(|e| torque[*e] != DVec3::ZERO).map(|e| 2 * e + 1));
         let n = 3 * self.nodes.len();
@@ -37,7 +44,8 @@ impl TorqueCorrection {
             y[self.nodes[k / 3]][k % 3] = 1.0;
             system.solve(blocks.clone(), zone, y);
         }
-        // With E the selection of the loaded nodes and B = diag([tau]x / 2): (H - E B E^T)^-1 r = z + Y (I - B E^T Y)^-1 B E^T z.
+        // With E the selection of the loaded nodes and B = diag([tau]x / 2): (H - E B E^T)^-1 r = z + Y (I - B E^T
+        // Y)^-1 B E^T z.
         self.dense.clear();
         self.dense.resize(n * n, 0.0);
         self.right.clear();

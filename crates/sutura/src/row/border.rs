@@ -1,12 +1,13 @@
-//! Unknowns that several rods share: where a pushed shape is on its line, where a weld is and how it is turned. They border the rods' system,
+//! Unknowns that several rods share: where a pushed shape is on its line, where a weld is and how it is turned. They
+//! border the rods' system,
 //!
 //! ```text
 //! [ H   B ] [dz]   [r]
 //! [ B^T D ] [dy] = [s]
 //! ```
 //!
-//! and are eliminated last: `dy = (D - B^T H^-1 B)^-1 (s - B^T z)`, `dz = z - H^-1 B dy` with `z = H^-1 r`. What an unknown is and which forces
-//! act on it is in [`pushed`](crate::row::pushed) and [`weld`](crate::row::weld).
+//! and are eliminated last: `dy = (D - B^T H^-1 B)^-1 (s - B^T z)`, `dz = z - H^-1 B dy` with `z = H^-1 r`. What an
+//! unknown is and which forces act on it is in [`pushed`](crate::row::pushed) and [`weld`](crate::row::weld).
 
 use crate::math::solve_dense;
 use crate::rod::factor::System;
@@ -47,7 +48,8 @@ pub(crate) struct Border {
 }
 
 impl Border {
-    /// Makes `count` unknowns that nothing links or pushes. Their last steps, and the contact forces found in them, are kept.
+    /// Makes `count` unknowns that nothing links or pushes. Their last steps, and the contact forces found in them, are
+    /// kept.
     pub fn clear(&mut self, count: usize) {
         if self.columns.len() < count {
             self.columns.resize_with(count, Column::default);
@@ -117,7 +119,8 @@ impl Border {
         &self.columns[k].response
     }
 
-    /// Takes what is held out of B and finds the responses; the rods' system is factored. False when the whole is not positive definite.
+    /// Takes what is held out of B and finds the responses; the rods' system is factored. False when the whole is not
+    /// positive definite.
     pub fn factor(&mut self, system: &System, rods: &[(Range<usize>, Range<usize>)], freedom: &[Freedom]) -> bool {
         let n = self.count;
         for c in &mut self.columns[..n] {
@@ -159,7 +162,8 @@ impl Border {
         solve_dense(&mut self.dense, v, self.count)
     }
 
-    /// Couples a solution `z` of the rods alone with the unknowns under their own forces, or under those of the small contact problem.
+    /// Couples a solution `z` of the rods alone with the unknowns under their own forces, or under those of the small
+    /// contact problem.
     pub fn couple(&mut self, z: &mut [DVec3], contacts: bool) {
         let n = self.count;
         if n == 0 {

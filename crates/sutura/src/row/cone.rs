@@ -1,18 +1,20 @@
 //! The small contact problem: minimize `l^T S l / 2 + b^T l` over normal forces >= 0 and friction forces within a disc.
 //!
-//! S is the compliance between contacts, symmetric positive definite (the contacts' own compliance is on its diagonal) and ill conditioned:
-//! of forty near contacts in a knot some eight carry, and the others are nearly dependent on them. With the radius of each disc held
-//! fixed the problem is convex; the radii follow mu times the normal forces in an outer loop. Taking the disc as part of a cone instead would
-//! lift a sliding contact (associated friction), which Coulomb's law does not.
+//! S is the compliance between contacts, symmetric positive definite (the contacts' own compliance is on its diagonal)
+//! and ill conditioned: of forty near contacts in a knot some eight carry, and the others are nearly dependent on them.
+//! With the radius of each disc held fixed the problem is convex; the radii follow mu times the normal forces in an
+//! outer loop. Taking the disc as part of a cone instead would lift a sliding contact (associated friction), which
+//! Coulomb's law does not.
 //!
-//! For fixed discs a primal active-set method (for the normals that of Lawson and Hanson 1974): a working set of normal forces and of
-//! friction forces inside their discs (two unknowns) or on their rims (one, the turn along the rim), a direct solution on it, a step up to the
-//! first bound that it meets. At the optimum of a set the contact that overlaps most enters, and friction that is pulled inward leaves
-//! its rim. The matrix is a [`Delassus`]. Up to the return to a rim each step lowers the objective; a budget ends what
-//! does not. Dependent contacts never share a working set for long, which is what makes sweeps and projected methods fail here.
+//! For fixed discs a primal active-set method (for the normals that of Lawson and Hanson 1974): a working set of normal
+//! forces and of friction forces inside their discs (two unknowns) or on their rims (one, the turn along the rim), a
+//! direct solution on it, a step up to the first bound that it meets. At the optimum of a set the contact that overlaps
+//! most enters, and friction that is pulled inward leaves its rim. The matrix is a [`Delassus`]. Up to the return to a
+//! rim each step lowers the objective; a budget ends what does not. Dependent contacts never share a working set for
+//! long, which is what makes sweeps and projected methods fail here.
 //!
-//! The radii's loop alone would take some eight rounds. Once a set is found, one Newton step solves it with every radius following its normal
-//! force (a nonsymmetric system); mostly that is the answer.
+//! The radii's loop alone would take some eight rounds. Once a set is found, one Newton step solves it with every
+//! radius following its normal force (a nonsymmetric system); mostly that is the answer.
 
 use crate::row::delassus::{Delassus, Friction, WorkingSet};
 
@@ -36,10 +38,12 @@ const SWING: u32 = 3;
 const EAGER: u32 = 30;
 /// Part of a step in which all friction forces that are near their rims meet them at once.
 const TOGETHER: f64 = 0.1;
-/// Turn of a rim \[rad\], and change of its stiffness over what the diagonal was, beyond which its row is factored again.
+/// Turn of a rim \[rad\], and change of its stiffness over what the diagonal was, beyond which its row is factored
+/// again.
 const STALE: f64 = 1e-3;
 
-/// How much less exact the rims are in the first round: its radii are those of the last forces, and Newton on the radii turns the rims too.
+/// How much less exact the rims are in the first round: its radii are those of the last forces, and Newton on the radii
+/// turns the rims too.
 const FIRST: f64 = 100.0;
 
 /// Memory of the solver.
@@ -57,8 +61,8 @@ pub(crate) struct Cone {
 }
 
 impl Cone {
-    /// Solves for `l` (three components a contact: normal, two tangential), starting from its value. `mu` is the coefficient
-    /// of each contact. Returns the residual reached \[m\].
+    /// Solves for `l` (three components a contact: normal, two tangential), starting from its value. `mu` is the
+    /// coefficient of each contact. Returns the residual reached \[m\].
     pub fn solve(&mut self, s: &mut impl Delassus, b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {
         let n = b.len();
         let m = n / 3;
@@ -110,7 +114,8 @@ impl Cone {
         reached
     }
 
-    /// Replaces changes of the gaps and slips by those of the forces on the last working set. False when there are none.
+    /// Replaces changes of the gaps and slips by those of the forces on the last working set. False when there are
+    /// none.
     pub fn response(&mut self, s: &mut impl Delassus, change: &mut [f64]) -> bool {
         self.gradient.copy_from_slice(change);
         let solved = s.solve_set(&self.set, &self.gradient, STALE, change);
@@ -179,8 +184,8 @@ impl Cone {
         worst
     }
 
-    /// Minimizes over normal forces and friction forces in the discs as they are, from the gradient at `l`, and leaves it there. Rims count as at rest when
-    /// they turn by no more than `loose` times the tolerance.
+    /// Minimizes over normal forces and friction forces in the discs as they are, from the gradient at `l`, and leaves
+    /// it there. Rims count as at rest when they turn by no more than `loose` times the tolerance.
     fn fixed_discs(&mut self, s: &mut impl Delassus, b: &[f64], l: &mut [f64], tolerance: f64, steps: u32, loose: f64) {
         let m = b.len() / 3;
         let (mut eager, mut part) = (true, 0.0);
@@ -243,8 +248,9 @@ impl Cone {
         l[3 * c + 1].powi(2) + l[3 * c + 2].powi(2) > (0.98 * self.disc[c]).powi(2)
     }
 
-    /// How hard each friction force on its rim is pulled outward, which holds it against turning. One that is pulled inward leaves its rim when `release`; before
-    /// it is held as if it were pulled outward, or it would turn far for nothing. Whether any left.
+    /// How hard each friction force on its rim is pulled outward, which holds it against turning. One that is pulled
+    /// inward leaves its rim when `release`; before it is held as if it were pulled outward, or it would turn far for
+    /// nothing. Whether any left.
     fn find_pulls(&mut self, release: bool, tolerance: f64) -> bool {
         let mut released = false;
         for (c, friction) in self.set.friction.iter_mut().enumerate() {
@@ -278,8 +284,9 @@ impl Cone {
         bound
     }
 
-    /// How far `l` may go toward the target before a bound of the working set is met or a rim has turned far; rims that are near already and met
-    /// within the first part `together` of the way do not count. And whether a contact may not move at all.
+    /// How far `l` may go toward the target before a bound of the working set is met or a rim has turned far; rims that
+    /// are near already and met within the first part `together` of the way do not count. And whether a contact may not
+    /// move at all.
     fn first_bound(&self, l: &[f64], together: f64) -> (f64, bool) {
         let (mut part, mut stuck) = (1.0f64, false);
         for c in 0..self.disc.len() {
@@ -300,11 +307,15 @@ impl Cone {
         (part, stuck)
     }
 
-    /// Takes the contacts that overlap most into the working set: those that overlap nearly as much as the worst and do not depend on each
-    /// other, or one. False when none overlaps.
+    /// Takes the contacts that overlap most into the working set: those that overlap nearly as much as the worst and do
+    /// not depend on each other, or one. False when none overlaps.
     fn enter(&mut self, s: &mut impl Delassus, m: usize, tolerance: f64, eager: bool) -> bool {
         self.waiting.clear();
-        self.waiting.extend((0..m).filter(|c| !self.set.pressed[*c] && self.gradient[3 * c] < -tolerance).map(|c| (self.gradient[3 * c], c)));
+        self.waiting.extend(
+            (0..m)
+                .filter(|c| !self.set.pressed[*c] && self.gradient[3 * c] < -tolerance)
+                .map(|c| (self.gradient[3 * c], c)),
+        );
         self.waiting.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         s.none_entered();
         let mut entered = false;
@@ -320,8 +331,8 @@ impl Cone {
         entered
     }
 
-    /// Minimizes over the working set without bounds, from the gradient at `l`; the minimum is left in `target`. False when its matrix is not positive
-    /// definite.
+    /// Minimizes over the working set without bounds, from the gradient at `l`; the minimum is left in `target`. False
+    /// when its matrix is not positive definite.
     fn solve_working_set(&mut self, s: &mut impl Delassus, l: &[f64], stale: f64) -> bool {
         let solved = s.solve_set(&self.set, &self.gradient, stale, &mut self.target);
         self.left -= s.spent();
@@ -331,8 +342,8 @@ impl Cone {
         solved
     }
 
-    /// Solves the working set with every disc of a contact on its rim following its normal force; the solution is left in `target`. False when it has
-    /// none.
+    /// Solves the working set with every disc of a contact on its rim following its normal force; the solution is left
+    /// in `target`. False when it has none.
     fn following_discs(&mut self, s: &mut impl Delassus, b: &[f64], mu: &[f64]) -> bool {
         let solved = s.solve_following(&self.set, b, mu, &mut self.target);
         self.left -= s.spent();
@@ -371,7 +382,8 @@ mod tests {
         let mut s = vec![0.0; n * n];
         for i in 0..n {
             for j in 0..n {
-                s[i * n + j] = (0..rank).map(|k| g[i * rank + k] * g[j * rank + k]).sum::<f64>() + if i == j { 1e-3 } else { 0.0 };
+                s[i * n + j] =
+                    (0..rank).map(|k| g[i * rank + k] * g[j * rank + k]).sum::<f64>() + if i == j { 1e-3 } else { 0.0 };
             }
         }
         (s, (0..n).map(|_| random(seed)).collect())
@@ -393,7 +405,13 @@ mod tests {
                 let (s, b) = problem(m, rank, &mut seed);
                 let n = 3 * m;
                 let mut l = vec![0.0; n];
-                let r = cone.solve(&mut dense(&s, n), &b, &vec![mu; m], &mut l, &Limits { residual: 1e-8, rounds: 100, steps: 200, work: f64::INFINITY });
+                let r = cone.solve(
+                    &mut dense(&s, n),
+                    &b,
+                    &vec![mu; m],
+                    &mut l,
+                    &Limits { residual: 1e-8, rounds: 100, steps: 200, work: f64::INFINITY },
+                );
                 assert!(r < 1e-6, "{m} contacts, mu {mu}: residual {r:e}");
                 for c in 0..m {
                     let g = |i: usize| b[i] + dot(&s[i * n..i * n + n], &l);
@@ -405,7 +423,10 @@ mod tests {
                     assert!(size <= mu * force + 1e-6);
                     if slip > 1e-4 && force > 1e-4 {
                         // Sliding: friction at its limit and against the slip.
-                        assert!((size - mu * force).abs() < 1e-4 && (ty * uy + tz * uz + size * slip).abs() < 1e-3 * (size * slip).max(1e-3));
+                        assert!(
+                            (size - mu * force).abs() < 1e-4
+                                && (ty * uy + tz * uz + size * slip).abs() < 1e-3 * (size * slip).max(1e-3)
+                        );
                     }
                 }
             }

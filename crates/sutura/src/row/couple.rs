@@ -1,9 +1,9 @@
 //! The small contact problem: its assembly in the rods' compliance and what its solution does.
 //!
-//! Each [`Entry`] is one contact. With W the inverse of the rods' Newton matrix and G the Jacobian of the contacts, `S = G W G^T` is the
-//! compliance between contacts. Newton's step without contact gives the right side, the contact forces follow from S ([`cone`]), and then
-//! the step that they cause. (A contact sweep that moves particles by their own inertia, m / h^2, cannot hold: the rod behind them is 10^5
-//! times stiffer.)
+//! Each [`Entry`] is one contact. With W the inverse of the rods' Newton matrix and G the Jacobian of the contacts, `S
+//! = G W G^T` is the compliance between contacts. Newton's step without contact gives the right side, the contact
+//! forces follow from S ([`cone`]), and then the step that they cause. (A contact sweep that moves particles by their
+//! own inertia, m / h^2, cannot hold: the rod behind them is 10^5 times stiffer.)
 //!
 //! [`cone`]: crate::row::cone
 
@@ -26,7 +26,8 @@ pub(crate) enum Source {
     Shape(u32),
 }
 
-/// A thread's side of a contact: its Jacobian as right-side columns (normal, two tangents) on blocks `element` and `element + 1`.
+/// A thread's side of a contact: its Jacobian as right-side columns (normal, two tangents) on blocks `element` and
+/// `element + 1`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Endpoint {
     pub element: usize,
@@ -44,7 +45,9 @@ impl Endpoint {
 
     /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
     fn restricted(&self, freedom: &[Freedom]) -> Self {
-        let keep = |node: usize, columns: DMat3| if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns };
+        let keep = |node: usize, columns: DMat3| {
+            if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns }
+        };
         let x = 2 * self.element;
         Endpoint { here: keep(x, self.here), next: keep(x + 2, self.next), ..*self }
     }
@@ -116,7 +119,14 @@ struct Assembly {
 
 impl Assembly {
     /// Adds `G W G^T` of each rod to the upper triangle of `s`.
-    fn compliance(&mut self, system: &mut System, rods: &[(Range<usize>, Range<usize>)], freedom: &[Freedom], entries: &[Entry], s: &mut [f64]) {
+    fn compliance(
+        &mut self,
+        system: &mut System,
+        rods: &[(Range<usize>, Range<usize>)],
+        freedom: &[Freedom],
+        entries: &[Entry],
+        s: &mut [f64],
+    ) {
         let Assembly { endpoints, blocks, jumps, .. } = self;
         for (_, zone) in rods {
             endpoints.clear();
@@ -151,7 +161,8 @@ impl Assembly {
         }
     }
 
-    /// Adds what gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld itself moves.
+    /// Adds what gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld
+    /// itself moves.
     fn shared(&mut self, border: &mut Border, entries: &[Entry], s: &mut [f64]) {
         let (m, n) = (border.count(), 3 * entries.len());
         if m == 0 {
@@ -195,9 +206,10 @@ fn finish_dense(entries: &[Entry], s: &mut [f64]) {
 /// Contacts that press, where threads touch each other, up to which S is put together in any case.
 const MANY: usize = 64;
 
-/// Says whether the contacts are so many that S is better not put together, by rough counts of multiplications. A dense solve puts it together and factors it about
-/// twice; a sparse one eliminates each block of the zones with two neighbors and those that contacts touch with five, about thrice. What rods share and the
-/// tension unknowns of inextensible elements are in the dense one only.
+/// Says whether the contacts are so many that S is better not put together, by rough counts of multiplications. A dense
+/// solve puts it together and factors it about twice; a sparse one eliminates each block of the zones with two
+/// neighbors and those that contacts touch with five, about thrice. What rods share and the tension unknowns of
+/// inextensible elements are in the dense one only.
 fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry], n: usize) -> bool {
     if entries.iter().filter(|e| e.force.x > 0.0).count() < MANY && entries.iter().any(|e| e.two) {
         return false;
@@ -248,18 +260,24 @@ impl Island {
         left / self.smallest
     }
 
-    /// Replaces changes of gaps and slips by those of the forces of the contacts that press. Where there are none, none.
+    /// Replaces changes of gaps and slips by those of the forces of the contacts that press. Where there are none,
+    /// none.
     fn respond(&mut self, change: &mut [f64]) {
         let change = &mut change[self.components()];
-        let solved = if self.many { self.cone.response(&mut self.sparse, change) } else { self.cone.response(&mut self.dense, change) };
+        let solved = if self.many {
+            self.cone.response(&mut self.sparse, change)
+        } else {
+            self.cone.response(&mut self.dense, change)
+        };
         if !solved {
             change.fill(0.0);
         }
     }
 }
 
-/// Sorts the entries by islands and finds these: rods that touch each other are of one, and all are where they share something at the border. An island is numbered
-/// as the first of its rods, so that it finds its memory again in the next iteration.
+/// Sorts the entries by islands and finds these: rods that touch each other are of one, and all are where they share
+/// something at the border. An island is numbered as the first of its rods, so that it finds its memory again in the
+/// next iteration.
 fn find_islands(coupling: &mut Coupling, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
     let Coupling { entries, islands, active, root, .. } = coupling;
     root.clear();
@@ -314,9 +332,11 @@ pub(crate) struct Coupling {
     left: f64,
 }
 
-/// Gap that a row may keep, and its compliance, so that overlap from before is won back over a few substeps. `depth` is to what the force at the start presses, by
-/// a law of `compliance` now. A row that lay deeper, by `-start_gap`, ends at `RECOVER * old + (1 - RECOVER) * depth`, never deeper than the larger of the two
-/// (what is deeper than its force explains must be able to bear more force without going deeper). What lies only a little deeper is between that and the law itself.
+/// Gap that a row may keep, and its compliance, so that overlap from before is won back over a few substeps. `depth` is
+/// to what the force at the start presses, by a law of `compliance` now. A row that lay deeper, by `-start_gap`, ends
+/// at `RECOVER * old + (1 - RECOVER) * depth`, never deeper than the larger of the two (what is deeper than its force
+/// explains must be able to bear more force without going deeper). What lies only a little deeper is between that and
+/// the law itself.
 pub(crate) fn regain(start_gap: f64, depth: f64, compliance: f64) -> (f64, f64) {
     let excess = -start_gap - depth;
     if excess <= 0.0 {
@@ -336,7 +356,11 @@ pub(crate) fn zones(scratch: &mut Scratch) {
     let Scratch { rods, rows, .. } = scratch;
     for (blocks, zone) in rods.iter_mut() {
         let (mut lo, mut hi) = (usize::MAX, 0);
-        let touched = rows.threads.iter().flat_map(thread::ThreadRow::elements).chain(rows.shapes.iter().filter_map(shape::ShapeRow::entering));
+        let touched = rows
+            .threads
+            .iter()
+            .flat_map(thread::ThreadRow::elements)
+            .chain(rows.shapes.iter().filter_map(shape::ShapeRow::entering));
         for e in touched.filter(|e| blocks.contains(e)) {
             lo = lo.min(e);
             hi = hi.max(e + 1);
@@ -379,7 +403,8 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
         let most = if island.many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };
         // What is left to the step is enough, or the iteration counts for nothing.
         let most = most.min((may_spend - *work).max(LEAST_WORK));
-        island.limits = Limits { residual: params::CONTACT_TOLERANCE * island.smallest, rounds: 15, steps: 60, work: most };
+        island.limits =
+            Limits { residual: params::CONTACT_TOLERANCE * island.smallest, rounds: 15, steps: 60, work: most };
         // Putting S together, and the most that its solution may take.
         *work += if island.many { most } else { 30.0 * (n * n) as f64 + most };
         if *work > params::SUBSTEP_WORK {
@@ -428,7 +453,13 @@ pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
 }
 
 /// Replaces forces on the nodes, and those on the unknowns of the border, by the step that they cause.
-fn respond(rods: &[(Range<usize>, Range<usize>)], system: &System, freedom: &[Freedom], border: &mut Border, right: &mut [DVec3]) {
+fn respond(
+    rods: &[(Range<usize>, Range<usize>)],
+    system: &System,
+    freedom: &[Freedom],
+    border: &mut Border,
+    right: &mut [DVec3],
+) {
     border.load_carried(right);
     for (r, freedom) in right.iter_mut().zip(freedom.iter()) {
         if *freedom != Freedom::Free {
@@ -465,8 +496,8 @@ fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec
     }
 }
 
-/// Replaces forces on the nodes by the step that they cause while the contacts that press go on pressing: the linear response of the last solution. The
-/// border's steps are to be set aside.
+/// Replaces forces on the nodes by the step that they cause while the contacts that press go on pressing: the linear
+/// response of the last solution. The border's steps are to be set aside.
 pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, freedom, work, .. } = scratch;
     let Coupling { entries, islands, active, right: more, change, b, .. } = &mut rows.solver;
@@ -488,7 +519,8 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
     }
 }
 
-/// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the step of both.
+/// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the
+/// step of both.
 pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
     let Scratch { rods, rows, system, step, freedom, work, .. } = scratch;
     let Coupling { entries, islands, active, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
@@ -575,7 +607,14 @@ fn own_compliance(system: &System, p: &Endpoint) -> DVec3 {
 }
 
 /// Adds `G W G^T` over the endpoints of one rod to the upper triangle of `s`.
-fn compliance_between(system: &System, endpoints: &[Placed], blocks: &[usize], jumps: &[Block], s: &mut [f64], n: usize) {
+fn compliance_between(
+    system: &System,
+    endpoints: &[Placed],
+    blocks: &[usize],
+    jumps: &[Block],
+    s: &mut [f64],
+    n: usize,
+) {
     for (qi, q) in endpoints.iter().enumerate() {
         // The column of the inverse at q's two blocks, then up by transfers: z_i = -k_i z_{i+1}.
         let (mut here, mut next) = response(system, &q.at);

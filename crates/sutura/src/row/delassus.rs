@@ -1,5 +1,5 @@
-//! The contact solver sees the problem's matrix through [`Delassus`]: the matrix S = G W G^T with the contacts' own compliance on its diagonal: [`Dense`]
-//! has it in full, [`Sparse`] never puts it together.
+//! The contact solver sees the problem's matrix through [`Delassus`]: the matrix S = G W G^T with the contacts' own
+//! compliance on its diagonal: [`Dense`] has it in full, [`Sparse`] never puts it together.
 //!
 //! [`Dense`]: crate::row::dense::Dense
 //! [`Sparse`]: crate::row::sparse::Sparse
@@ -36,14 +36,17 @@ pub(crate) trait Delassus {
     /// Contacts that enter the working set together: none yet.
     fn none_entered(&mut self);
 
-    /// Says whether a contact may enter with those that have, since it does not depend on them, and counts it as one of them then.
+    /// Says whether a contact may enter with those that have, since it does not depend on them, and counts it as one of
+    /// them then.
     fn enters(&mut self, c: usize) -> bool;
 
-    /// Minimizes over the working set without bounds, from a point with this gradient: the change of the forces. Rims may stand a little otherwise where the
-    /// factorization is of what they were (`stale`, in rad). False when the matrix of the set is not positive definite.
+    /// Minimizes over the working set without bounds, from a point with this gradient: the change of the forces. Rims
+    /// may stand a little otherwise where the factorization is of what they were (`stale`, in rad). False when the
+    /// matrix of the set is not positive definite.
     fn solve_set(&mut self, set: &WorkingSet, gradient: &[f64], stale: f64, change: &mut [f64]) -> bool;
 
-    /// Solves the working set with the friction on every rim following the normal force by `mu`: the forces. False when there is no solution.
+    /// Solves the working set with the friction on every rim following the normal force by `mu`: the forces. False when
+    /// there is no solution.
     fn solve_following(&mut self, set: &WorkingSet, b: &[f64], mu: &[f64], forces: &mut [f64]) -> bool;
 
     /// Multiplications since last asked, about.

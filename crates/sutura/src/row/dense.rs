@@ -1,4 +1,5 @@
-//! The Delassus matrix put together: for few contacts. The factorization of the working set follows it row by row ([`Ldl`]).
+//! The Delassus matrix put together: for few contacts. The factorization of the working set follows it row by row
+//! ([`Ldl`]).
 
 use crate::row::delassus::{Delassus, Friction, WorkingSet};
 use crate::row::ldl::{Ldl, dot};
@@ -152,7 +153,9 @@ impl Dense {
                         positive &= self.push(Unknown { contact, kind: Kind::Component(a), turn: 0.0 });
                     }
                 }
-                Friction::Rim(y, z, turn) if have[c] & 2 == 0 => positive &= self.push(Unknown { contact, kind: Kind::Turn(-z, y), turn }),
+                Friction::Rim(y, z, turn) if have[c] & 2 == 0 => {
+                    positive &= self.push(Unknown { contact, kind: Kind::Turn(-z, y), turn })
+                }
                 _ => {}
             }
         }
@@ -232,7 +235,9 @@ impl Delassus for Dense {
             let contact = 3 * c;
             unknowns.push(Unknown { contact, kind: Kind::Component(0), turn: 0.0 });
             match set.friction[c] {
-                Friction::Inside => unknowns.extend([1, 2].map(|a| Unknown { contact, kind: Kind::Component(a), turn: 0.0 })),
+                Friction::Inside => {
+                    unknowns.extend([1, 2].map(|a| Unknown { contact, kind: Kind::Component(a), turn: 0.0 }))
+                }
                 Friction::Rim(y, z, turn) => unknowns.push(Unknown { contact, kind: Kind::Turn(-z, y), turn }),
                 Friction::None => {}
             }

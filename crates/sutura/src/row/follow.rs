@@ -1,6 +1,8 @@
-//! Friction of sliding firm rows follows their normal forces. In the rods' matrix the friction force of such a row has a fixed size, mu times the normal force that
-//! presses now: a matrix in which it followed would not be symmetric. Letting it follow from one Newton iteration to the next is a fixed-point iteration whose
-//! error shrinks as (mu phi)^k / k! along one strand around a post, so it grows at first; where both strands of a knot slide it was seen to grow to the end.
+//! Friction of sliding firm rows follows their normal forces. In the rods' matrix the friction force of such a row has
+//! a fixed size, mu times the normal force that presses now: a matrix in which it followed would not be symmetric.
+//! Letting it follow from one Newton iteration to the next is a fixed-point iteration whose error shrinks as (mu phi)^k
+//! / k! along one strand around a post, so it grows at first; where both strands of a knot slide it was seen to grow to
+//! the end.
 //!
 //! So each Newton step is corrected: the changes `v` of the sizes solve
 //!
@@ -8,9 +10,9 @@
 //! v = mu (N(z) - N),    z = z0 + (A^-1 with the contacts that press) G^T d v
 //! ```
 //!
-//! with N(z) the normal force that the step z leads to and d the direction of the friction. That is a linear system of one unknown per row; products with its
-//! matrix take two solutions of the rods, since their factor is there, and GMRES (Saad and Schultz 1986) needs a few of them: along a thread friction only
-//! hands on tension from row to row.
+//! with N(z) the normal force that the step z leads to and d the direction of the friction. That is a linear system of
+//! one unknown per row; products with its matrix take two solutions of the rods, since their factor is there, and GMRES
+//! (Saad and Schultz 1986) needs a few of them: along a thread friction only hands on tension from row to row.
 
 use crate::row::{Rows, couple};
 use crate::scratch::Scratch;
@@ -59,7 +61,11 @@ impl Follow {
             let mut due = false;
             let largest = self.rows.iter().map(|k| scratch.rows.shapes[*k as usize].normal_force).fold(0.0, f64::max);
             for k in &self.rows {
-                let (missing, active) = scratch.rows.shapes[*k as usize].missing(&scratch.step, &scratch.rows.sliders, &scratch.rows.border);
+                let (missing, active) = scratch.rows.shapes[*k as usize].missing(
+                    &scratch.step,
+                    &scratch.rows.sliders,
+                    &scratch.rows.border,
+                );
                 due |= missing.abs() > 0.5 * crate::params::OFF_BALANCE * largest;
                 self.missing.push(missing);
                 self.active.push(active);

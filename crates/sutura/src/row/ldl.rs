@@ -1,4 +1,5 @@
-//! A dense L D L^T factorization whose matrix grows by a row at the end and shrinks by any row, at the cost of a solve instead of a factorization.
+//! A dense L D L^T factorization whose matrix grows by a row at the end and shrinks by any row, at the cost of a solve
+//! instead of a factorization.
 
 /// L below the diagonal and D on it, packed row after row.
 #[derive(Debug, Default)]
@@ -20,7 +21,8 @@ impl Ldl {
         self.packed.clear();
     }
 
-    /// Adds the last row of the grown matrix, diagonal included. False, and nothing added, when it is not positive definite.
+    /// Adds the last row of the grown matrix, diagonal included. False, and nothing added, when it is not positive
+    /// definite.
     pub fn push(&mut self, entries: impl Iterator<Item = f64>) -> bool {
         let n = self.size;
         let from = self.packed.len();
@@ -45,8 +47,8 @@ impl Ldl {
         true
     }
 
-    /// Takes row and column `k` out: what they had taken from those after them comes back, a positive update of rank one (Gill, Golub, Murray and
-    /// Saunders 1974, method C1).
+    /// Takes row and column `k` out: what they had taken from those after them comes back, a positive update of rank
+    /// one (Gill, Golub, Murray and Saunders 1974, method C1).
     pub fn remove(&mut self, k: usize) {
         let n = self.size;
         let mut weight = self.packed[row(k) + k];

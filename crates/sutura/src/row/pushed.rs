@@ -1,5 +1,6 @@
-//! Shapes pushed along a line by a force: one unknown each, coupled to all threads that touch the shape ([`border`](crate::row::border)). The
-//! shape has no mass; the force law `F (1 - v / v_limit)` is its damping, taken implicitly.
+//! Shapes pushed along a line by a force: one unknown each, coupled to all threads that touch the shape
+//! ([`border`](crate::row::border)). The shape has no mass; the force law `F (1 - v / v_limit)` is its damping, taken
+//! implicitly.
 
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
@@ -42,7 +43,10 @@ impl Sliders {
     pub fn assemble(&self, model: &Model, state: &State, start: &[crate::math::Pose], border: &mut Border) {
         let h = self.h;
         for (k, s) in self.sliders.iter().enumerate() {
-            let Some(ShapeMotion::Pushed { force, speed_limit, .. }) = model.shapes.at(s.shape).map(|s| s.motion) else { continue };
+            let Some(ShapeMotion::Pushed { force, speed_limit, .. }) = model.shapes.at(s.shape).map(|s| s.motion)
+            else {
+                continue;
+            };
             let damper = force / (speed_limit * h);
             let moved = s.direction.dot(state.shape_pose[s.shape as usize].position - start[s.shape as usize].position);
             border.add_own(k, k, damper);

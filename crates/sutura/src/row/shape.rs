@@ -1,22 +1,24 @@
-//! Contact of thread with shapes: normal force `k gap^2` for gap < 0, gap = signed distance of the centerline point less r (and less a
-//! fiftieth of the diameter, kept in reserve for the chords between particles), with Coulomb friction. It stiffens as Hertz contact does; k is
-//! such that a force of `E r^2 / 1000` leaves a gap of -r / 100.
+//! Contact of thread with shapes: normal force `k gap^2` for gap < 0, gap = signed distance of the centerline point
+//! less r (and less a fiftieth of the diameter, kept in reserve for the chords between particles), with Coulomb
+//! friction. It stiffens as Hertz contact does; k is such that a force of `E r^2 / 1000` leaves a gap of -r / 100.
 //!
-//! A row that bore a firm load is a spring in the rods' own matrix: cost is linear in the number of such rows. All others (light ones, those
-//! that touch, lift off or lie much deeper than their force says) enter the small contact problem ([`couple`]), which decides all of them
-//! at once; Newton alone would switch them on and off from one iteration to the next.
+//! A row that bore a firm load is a spring in the rods' own matrix: cost is linear in the number of such rows. All
+//! others (light ones, those that touch, lift off or lie much deeper than their force says) enter the small contact
+//! problem ([`couple`]), which decides all of them at once; Newton alone would switch them on and off from one
+//! iteration to the next.
 //!
-//! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the normal one: while the trial
-//! force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep; beyond, the force stays on the disc. Both forces act
-//! at the centerline.
+//! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the
+//! normal one: while the trial force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep;
+//! beyond, the force stays on the disc. Both forces act at the centerline.
 //! The friction of rows that slide follows their normal forces within each iteration ([`follow`](crate::row::follow)).
-//! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active set): one that slides and
-//! is pushed back against its friction has stopped. Going by the trial force alone it would slide the other way then, and to and fro,
-//! since the spring is 10^4 times and more stiffer than the inertia behind it. A substep counts only where the law agrees with the forces that it was
-//! solved with, and the next one starts from those.
+//! Which of the two a firm row does is decided once an iteration, going by what it did in the one before (an active
+//! set): one that slides and is pushed back against its friction has stopped. Going by the trial force alone it would
+//! slide the other way then, and to and fro, since the spring is 10^4 times and more stiffer than the inertia behind
+//! it. A substep counts only where the law agrees with the forces that it was solved with, and the next one starts from
+//! those.
 //!
-//! A row that slides by more than a trace has the kinetic coefficient in the next substep. Within a substep there is one coefficient, or
-//! evening out forces between contacts that together hold would set them off one after the other.
+//! A row that slides by more than a trace has the kinetic coefficient in the next substep. Within a substep there is
+//! one coefficient, or evening out forces between contacts that together hold would set them off one after the other.
 //!
 //! [`couple`]: crate::row::couple
 
@@ -79,7 +81,8 @@ pub(crate) struct ShapeRow {
     /// Normal force that limits the friction of a firm row, and what that does.
     pressed: f64,
     mode: Mode,
-    /// Direction of its friction while it slides, and what the size of that has grown by since the matrix was put together \[N\].
+    /// Direction of its friction while it slides, and what the size of that has grown by since the matrix was put
+    /// together \[N\].
     rim: DVec3,
     followed: f64,
     /// How often it slid and stopped in this substep.
@@ -99,13 +102,15 @@ enum Mode {
 /// Normal force over E times the gap squared.
 const HARDNESS: f64 = 10.0;
 
-/// Radius of a surface, with the thread's own, from which on a row within an element does not follow the nearest place, in radii of the thread.
+/// Radius of a surface, with the thread's own, from which on a row within an element does not follow the nearest place,
+/// in radii of the thread.
 const FLAT: f64 = 8.0;
 
 /// How often a firm row may slide and stop in a substep.
 const RESTLESS: u32 = 1;
 
-/// How much nearer than its ends a place within an element is that has a row of its own, in radii; and over an edge sharper than the thread.
+/// How much nearer than its ends a place within an element is that has a row of its own, in radii; and over an edge
+/// sharper than the thread.
 const BULGE: f64 = 0.08;
 const SHARP_BULGE: f64 = 0.004;
 
@@ -147,7 +152,10 @@ impl ShapeRow {
         self.anchor += across(c.friction);
         self.friction = self.anchor;
         self.firm = self.carried > self.least;
-        self.mode = Some(self.friction).filter(|_| self.sliding).and_then(DVec3::try_normalize).map_or(Mode::Sticks, Mode::Slides);
+        self.mode = Some(self.friction)
+            .filter(|_| self.sliding)
+            .and_then(DVec3::try_normalize)
+            .map_or(Mode::Sticks, Mode::Slides);
     }
 
     /// Says whether this is a firm row that slides.
@@ -188,7 +196,8 @@ impl ShapeRow {
         [n, t1, n.cross(t1)]
     }
 
-    /// Compliance with which it enters the small problem: gap over force at the last force, which a light contact is taken to have at least.
+    /// Compliance with which it enters the small problem: gap over force at the last force, which a light contact is
+    /// taken to have at least.
     fn compliance(&self) -> f64 {
         1.0 / (self.hardness * self.normal_force.max(self.least)).sqrt()
     }
@@ -232,10 +241,18 @@ impl Site<'_> {
             }
         };
         let before = self.shape().collider.distance(self.start_pose, at(self.start));
-        (before, self.shape().collider.follow((self.start_pose, at(self.start), before), (self.pose, at(self.now)), before.normal))
+        (
+            before,
+            self.shape().collider.follow(
+                (self.start_pose, at(self.start), before),
+                (self.pose, at(self.now)),
+                before.normal,
+            ),
+        )
     }
 
-    /// Direction of the thread at a place within the element, which turns evenly from the middle of one element to that of the next.
+    /// Direction of the thread at a place within the element, which turns evenly from the middle of one element to that
+    /// of the next.
     fn smooth_direction(&self, s: f64) -> DVec3 {
         let (e, x) = (self.element, self.start);
         let of = |e: usize| (x[e + 1] - x[e]).normalize_or_zero();
@@ -354,7 +371,9 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
         shape.collider.least_between(local, [body(first.0), body(second.0)], below, |s, d| between(s, d.value));
         let moved = (next[0] - local[0]).length_squared().max((next[1] - local[1]).length_squared());
         if moved > (params::SAME_ROW * radius).powi(2) {
-            shape.collider.least_between(next, next.map(|p| shape.collider.distance_local(p)), below, |s, d| between(s, d.value));
+            shape
+                .collider
+                .least_between(next, next.map(|p| shape.collider.distance_local(p)), below, |s, d| between(s, d.value));
         }
         for s in &places[..count] {
             let seen = site.look(*s);
@@ -369,9 +388,10 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64)
     merge(rows);
 }
 
-/// Whether a place between two particles needs a row of its own: where the surface bulges toward the middle by more than may overlap. On a flatter one a chord would
-/// rock about the row: the closest place runs along the element by (radius of the surface) x (tilt). It does not about an edge sharper than the thread,
-/// which shows by how fast the distance grows.
+/// Whether a place between two particles needs a row of its own: where the surface bulges toward the middle by more
+/// than may overlap. On a flatter one a chord would rock about the row: the closest place runs along the element by
+/// (radius of the surface) x (tilt). It does not about an edge sharper than the thread, which shows by how fast the
+/// distance grows.
 fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool {
     let way = length * if ends[0] < ends[1] { s } else { 1.0 - s };
     let bulge = ends[0].min(ends[1]) - value;
@@ -380,13 +400,15 @@ fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool 
     s > 0.02 && s < 0.98 && (bulge > BULGE * radius || sharp && bulge > SHARP_BULGE * radius)
 }
 
-/// Where a place within an element is taken to touch: where it last did, as far as that is about as near as the nearest place `s`, whose distance is `value`. The
-/// nearest place on a flat surface runs along the element with the least tilt, and a row that follows it makes the element rock: it would tilt back by as much in the
-/// next substep. On an edge it stays where it is while the thread is drawn over it, and the row has to follow.
+/// Where a place within an element is taken to touch: where it last did, as far as that is about as near as the nearest
+/// place `s`, whose distance is `value`. The nearest place on a flat surface runs along the element with the least
+/// tilt, and a row that follows it makes the element rock: it would tilt back by as much in the next substep. On an
+/// edge it stays where it is while the thread is drawn over it, and the row has to follow.
 fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, length: f64, radius: f64) -> f64 {
     let place = |c: &ShapeContact| (c.shape, c.element as usize);
     let from = old.partition_point(|c| place(c) < (site.slot, site.element));
-    let near = old[from..].iter().take_while(|c| place(c) == (site.slot, site.element)).filter(|c| c.s > 0.0 && c.s < 1.0);
+    let near =
+        old[from..].iter().take_while(|c| place(c) == (site.slot, site.element)).filter(|c| c.s > 0.0 && c.s < 1.0);
     let Some(last) = near.map(|c| c.s).min_by(|a, b| (a - s).abs().total_cmp(&(b - s).abs())) else { return s };
     let (before, now) = site.look(last);
     let farther = before.value.min(now.value) - value;
@@ -398,8 +420,9 @@ fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, length:
     s + (last - s) * if farther <= allowed { 1.0 } else { (allowed / farther).sqrt() }
 }
 
-/// Drops rows at particles beside an edge that has its own row on the element: both have the same foot. A thread bears on an edge with its side, across its direction; a
-/// row at a particle that is yet to come to the edge would bear on it head on, and each particle that is drawn over it would be a bump.
+/// Drops rows at particles beside an edge that has its own row on the element: both have the same foot. A thread bears
+/// on an edge with its side, across its direction; a row at a particle that is yet to come to the edge would bear on it
+/// head on, and each particle that is drawn over it would be a bump.
 fn leave_to_edges(rows: &mut Vec<ShapeRow>, start: &[DVec3]) {
     let at = |r: &ShapeRow| {
         let e = r.element as usize;
@@ -427,27 +450,38 @@ fn between(rows: &[ShapeRow], shape: u32, from: f64, to: f64) -> Range<usize> {
     rows.partition_point(|r| r.key() < (shape, from))..rows.partition_point(|r| r.key() <= (shape, to))
 }
 
-/// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on another one in its place: the half of a
-/// post that a thread touches now may be the other one.
+/// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on
+/// another one in its place: the half of a post that a thread touches now may be the other one.
 fn inherit(old: &[ShapeContact], model: &Model, rows: &mut [ShapeRow]) {
     for c in old {
         let place = f64::from(c.element) + c.s;
         let nearest = |shape: u32, reach: f64, facing: f64| {
             let far = |k: &usize| (rows[*k].place() - place).abs();
-            let there = |r: &ShapeRow| model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing;
-            between(rows, shape, place - reach, place + reach).filter(|k| there(&rows[*k])).min_by(|a, b| far(a).total_cmp(&far(b)))
+            let there = |r: &ShapeRow| {
+                model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing
+            };
+            between(rows, shape, place - reach, place + reach)
+                .filter(|k| there(&rows[*k]))
+                .min_by(|a, b| far(a).total_cmp(&far(b)))
         };
-        let found = nearest(c.shape, 0.3, 0.5).or_else(|| model.shapes.iter().find_map(|(other, _)| nearest(other, 1e-9, 0.9999)));
+        let found = nearest(c.shape, 0.3, 0.5)
+            .or_else(|| model.shapes.iter().find_map(|(other, _)| nearest(other, 1e-9, 0.9999)));
         if let Some(k) = found {
             rows[k].receive(c);
         }
     }
 }
 
-/// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that is nearer now and next, or
-/// where they are alike the one that carried force. Both stay where one overtakes the other.
+/// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that
+/// is nearer now and next, or where they are alike the one that carried force. Both stay where one overtakes the other.
 fn merge(rows: &mut Vec<ShapeRow>) {
-    rows.sort_unstable_by(|a, b| a.element.cmp(&b.element).then(a.s.total_cmp(&b.s)).then(b.carried.total_cmp(&a.carried)).then(a.shape.cmp(&b.shape)));
+    rows.sort_unstable_by(|a, b| {
+        a.element
+            .cmp(&b.element)
+            .then(a.s.total_cmp(&b.s))
+            .then(b.carried.total_cmp(&a.carried))
+            .then(a.shape.cmp(&b.shape))
+    });
     rows.dedup_by(|b, a| {
         // Neighboring elements share a particle.
         let place = (a.place() - b.place()).abs() < 1e-3;
@@ -464,8 +498,9 @@ fn merge(rows: &mut Vec<ShapeRow>) {
     });
 }
 
-/// What of a surface's direction is across the thread. A thread is bent over an edge in a smooth curve, which the edge presses across: across the elements, from
-/// one to the next, the force would turn back and forth, and each joint drawn over the edge would be a notch.
+/// What of a surface's direction is across the thread. A thread is bent over an edge in a smooth curve, which the edge
+/// presses across: across the elements, from one to the next, the force would turn back and forth, and each joint drawn
+/// over the edge would be a notch.
 fn across(normal: DVec3, smooth: Option<DVec3>) -> DVec3 {
     smooth.map_or(normal, |t| (normal - t * t.dot(normal)).normalize_or(normal))
 }
@@ -483,17 +518,20 @@ fn look(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow) -> 
     p
 }
 
-/// Slip of the thread against the shape's surface since the start of the substep, with what was still to be undone then.
+/// Slip of the thread against the shape's surface since the start of the substep, with what was still to be undone
+/// then.
 fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
-    let carried = surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p - n * row.radius);
+    let carried =
+        surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p - n * row.radius);
     let slip = p - start.position[e].lerp(start.position[e + 1], row.s) - carried + row.drift;
     slip - n * n.dot(slip)
 }
 
-/// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first iteration the row is
-/// linearized where it carried its force: Newton starts where velocity leads, which may be just off the surface.
+/// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first
+/// iteration the row is linearized where it carried its force: Newton starts where velocity leads, which may be just
+/// off the surface.
 fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DVec3 {
     look(model, state, start, row);
     let n = row.normal;
@@ -511,7 +549,8 @@ fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, fi
     row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * row.stiffness
 }
 
-/// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has stopped.
+/// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has
+/// stopped.
 fn decide(row: &mut ShapeRow, trial: DVec3) {
     let (size, limit) = (trial.length(), row.mu() * row.pressed);
     let before = row.mode;
@@ -552,9 +591,12 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
         let trial = press(model, state, &start, row, first);
-        // Much deeper than its force says, its law is far from the parabola's tangent. One that slides and stops by turns may do so with
-        // another one for ever: the small problem decides all of them at once.
-        if row.gap < -3.0 * (row.carried / row.hardness).sqrt() || row.normal_force <= 0.0 && !first || row.stops > RESTLESS {
+        // Much deeper than its force says, its law is far from the parabola's tangent. One that slides and stops by
+        // turns may do so with another one for ever: the small problem decides all of them at once.
+        if row.gap < -3.0 * (row.carried / row.hardness).sqrt()
+            || row.normal_force <= 0.0 && !first
+            || row.stops > RESTLESS
+        {
             *row = ShapeRow { firm: false, ..before };
         } else {
             decide(row, trial);
@@ -600,20 +642,29 @@ pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
     let Scratch { rows, step, .. } = scratch;
     let (sliders, border) = (&rows.sliders, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
-        row.expected =
-            row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale) - row.tangent * moved(row, step, sliders, border) * scale;
+        row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale)
+            - row.tangent * moved(row, step, sliders, border) * scale;
     }
 }
 
 /// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
 pub(crate) fn work_unforeseen(scratch: &Scratch) -> f64 {
     let Scratch { rows, step, .. } = scratch;
-    let on = |row: &ShapeRow| (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders, &rows.border));
+    let on = |row: &ShapeRow| {
+        (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders, &rows.border))
+    };
     rows.shapes.iter().filter(|r| r.firm).map(on).sum()
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ShapeRow], shared: (&Sliders, &Border), entries: &mut Vec<Entry>) {
+pub(crate) fn enter(
+    state: &State,
+    start: &Start<'_>,
+    step: &[DVec3],
+    rows: &mut [ShapeRow],
+    shared: (&Sliders, &Border),
+    entries: &mut Vec<Entry>,
+) {
     let (sliders, border) = shared;
     for (k, row) in rows.iter_mut().enumerate().filter(|(_, r)| !r.firm) {
         let e = row.element as usize;
@@ -653,7 +704,8 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
     if from == to { DVec3::ZERO } else { point - from.transform_point(to.inverse_transform_point(point)) }
 }
 
-/// Whether the iterate agrees with the forces that it was computed with: what the law says now against its linearization.
+/// Whether the iterate agrees with the forces that it was computed with: what the law says now against its
+/// linearization.
 pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, iterations: u32) -> bool {
     let Scratch { rows, start, start_shape_pose, step, .. } = scratch;
     let start = Start { position: start, shape: start_shape_pose };
@@ -668,12 +720,14 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                 let trial = press(model, state, &start, &mut now, false);
                 decide(&mut now, trial);
                 forces(&mut now, trial);
-                // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the next substep.
+                // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the
+                // next substep.
                 let friction = if row.mode == Mode::Sticks { trial } else { row.friction + row.rim * row.followed };
                 let normal_force = (row.normal_force - row.stiffness * (now.gap - row.gap)).max(0.0);
                 let off = (now.normal_force - normal_force).abs().max((now.friction - friction).length());
                 // Where one after another goes over its limit the last digit would take an iteration each.
-                let front = iterations > params::FRONT && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
+                let front = iterations > params::FRONT
+                    && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
                 look(model, state, &start, &mut now);
@@ -686,8 +740,9 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
     settled
 }
 
-/// Adds rows where the iterate comes nearer to a shape than the forces there press it, although all rows are satisfied: a row keeps its place on the thread, and the
-/// edge or wall that it was set up against may have come to another. True when any was added.
+/// Adds rows where the iterate comes nearer to a shape than the forces there press it, although all rows are satisfied:
+/// a row keeps its place on the thread, and the edge or wall that it was set up against may have come to another. True
+/// when any was added.
 pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let mut fresh = core::mem::take(&mut scratch.rows.fresh_shapes);
     fresh.clear();
@@ -698,7 +753,16 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let r = scratch.radius[e];
         let length = (x[e + 1] - x[e]).length();
         let (start_pose, pose) = (&scratch.start_shape_pose[k], &state.shape_pose[k]);
-        let site = Site { model, slot: *slot, element: e, pushed: DVec3::ZERO, start: &scratch.start, start_pose, now: x, pose };
+        let site = Site {
+            model,
+            slot: *slot,
+            element: e,
+            pushed: DVec3::ZERO,
+            start: &scratch.start,
+            start_pose,
+            now: x,
+            pose,
+        };
         let local = [x[e], x[e + 1]].map(|p| pose.inverse_transform_point(p));
         let ends = local.map(|p| collider.distance_local(p));
         let least = r * (1.0 + 2.0 * (params::KEEP - params::SLACK));
@@ -710,7 +774,9 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let apart = if matches!(collider, Collider::Surface(_)) { APART } else { 0.7 };
         let mut pressed = None;
         let mut look = |s: f64, d: Distance| {
-            if d.value >= least || d.value >= least - *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e)) {
+            if d.value >= least
+                || d.value >= least - *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e))
+            {
                 return;
             }
             let at = |x: &[DVec3]| x[e].lerp(x[e + 1], s);
@@ -730,10 +796,15 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
                 return;
             }
             let place = e as f64 + s;
-            let known = |row: &ShapeRow| row.shape == *slot && (row.place() - place).abs() * length < params::SAME_ROW * r && row.normal.dot(normal) > apart;
+            let known = |row: &ShapeRow| {
+                row.shape == *slot
+                    && (row.place() - place).abs() * length < params::SAME_ROW * r
+                    && row.normal.dot(normal) > apart
+            };
             if !rows.iter().chain(&fresh).any(known) {
                 let mut row = site.row(s, before, Distance { value: d.value, normal });
-                (row.normal, row.gap, row.wanted) = (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);
+                (row.normal, row.gap, row.wanted) =
+                    (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);
                 fresh.push(row);
             }
         };
@@ -755,7 +826,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
     any
 }
 
-/// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed with.
+/// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed
+/// with.
 pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
     let Scratch { rows, start, start_shape_pose, .. } = scratch;
     let start = Start { position: start, shape: start_shape_pose };

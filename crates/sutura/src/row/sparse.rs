@@ -1,14 +1,16 @@
-//! The Delassus matrix never put together: for many contacts. A working set is added to the rods' matrix A in the zones as springs of the contacts' own
-//! compliance, H = A + G^T B G, and that is factored by blocks of six (a particle with its frame), multifrontally, in an order of least degree. Threads that
-//! touch have a narrow graph whatever the number of contacts (along two strands wound about each other fronts are some four blocks wide), so the cost is linear
-//! in it. With w = S l + b the gradient and B the force per gap of a contact of the set,
+//! The Delassus matrix never put together: for many contacts. A working set is added to the rods' matrix A in the zones
+//! as springs of the contacts' own compliance, H = A + G^T B G, and that is factored by blocks of six (a particle with
+//! its frame), multifrontally, in an order of least degree. Threads that touch have a narrow graph whatever the number
+//! of contacts (along two strands wound about each other fronts are some four blocks wide), so the cost is linear in
+//! it. With w = S l + b the gradient and B the force per gap of a contact of the set,
 //!
 //! ```text
 //! (A + G^T B G) z = -G^T B w,      change of the forces = -B (w + G z),
 //! ```
 //!
-//! which by elimination of z is the working set's own equation. Pivots are safe without exchange: A is positive definite, and contacts are about as stiff as
-//! stretch. What did not change since the last factorization, and all that it was eliminated into, is not factored again.
+//! which by elimination of z is the working set's own equation. Pivots are safe without exchange: A is positive
+//! definite, and contacts are about as stiff as stretch. What did not change since the last factorization, and all that
+//! it was eliminated into, is not factored again.
 
 use crate::rod::factor::{Block, System};
 use crate::row::delassus::{Delassus, Friction, WorkingSet};
@@ -34,7 +36,8 @@ struct Site {
     owner: u32,
 }
 
-/// An eliminated node: the later ones that it is coupled to, in order of elimination, and where its (1 + up)^2 blocks are.
+/// An eliminated node: the later ones that it is coupled to, in order of elimination, and where its (1 + up)^2 blocks
+/// are.
 #[derive(Debug, Clone, Default)]
 struct Front {
     up: Range<usize>,
@@ -104,7 +107,8 @@ impl Sparse {
                 self.diagonal.push(whole(&Block { tx: own.xt.transpose(), ..own }));
                 self.next.push((i + 1 < zone.end).then(|| whole(&to)));
             }
-            // The factor's pivots are what is left after the blocks before: what those took is put back, U^T P^-1 U = K^T U.
+            // The factor's pivots are what is left after the blocks before: what those took is put back, U^T P^-1 U =
+            // K^T U.
             for i in zone.start..zone.end - 1 {
                 let k = from + i - zone.start;
                 let transfer = whole(system.transfer(i));
@@ -133,7 +137,15 @@ impl Sparse {
 
     /// Adds a contact that touches these blocks, with its components as columns on their positions.
     pub fn push(&mut self, places: impl Iterator<Item = (usize, DMat3)>, compliance: DVec3, diagonal: DVec3) {
-        let mut site = Site { count: 0, node: [0; 4], jacobian: [DMat3::ZERO; 4], compliance, diagonal, spring: DMat3::ZERO, owner: 0 };
+        let mut site = Site {
+            count: 0,
+            node: [0; 4],
+            jacobian: [DMat3::ZERO; 4],
+            compliance,
+            diagonal,
+            spring: DMat3::ZERO,
+            owner: 0,
+        };
         for (block, x) in places {
             let node = self.node(block);
             let k = site.node[..site.count].iter().position(|n| *n == node).unwrap_or(site.count);
@@ -144,7 +156,8 @@ impl Sparse {
         self.sites.push(site);
     }
 
-    /// Finds the order of elimination, where the graph is another one, and factors the rods alone. False when a pivot is not positive.
+    /// Finds the order of elimination, where the graph is another one, and factors the rods alone. False when a pivot
+    /// is not positive.
     pub fn prepare(&mut self) -> bool {
         let n = self.diagonal.len();
         let now = &mut self.order.now;
@@ -174,8 +187,8 @@ impl Sparse {
         good
     }
 
-    /// Least degree, in rounds of nodes that are not neighbors, so that the tree of fronts is flat. Nodes that no contact touches come first: they are eliminated
-    /// once for all working sets.
+    /// Least degree, in rounds of nodes that are not neighbors, so that the tree of fronts is flat. Nodes that no
+    /// contact touches come first: they are eliminated once for all working sets.
     fn find_order(&mut self) {
         let n = self.diagonal.len();
         let Order { nodes, place, adjacent, touched, left, then, blocked, by_owner, .. } = &mut self.order;
@@ -258,7 +271,8 @@ impl Sparse {
         }
     }
 
-    /// Gives each contact what it adds in a working set. With `mu` friction on a rim follows the normal force, and only contacts that press count.
+    /// Gives each contact what it adds in a working set. With `mu` friction on a rim follows the normal force, and only
+    /// contacts that press count.
     fn set_springs(&mut self, set: &WorkingSet, mu: Option<&[f64]>) {
         for (c, site) in self.sites.iter_mut().enumerate() {
             let spring = spring(set.pressed[c], set.friction[c], site.compliance, mu.map(|mu| mu[c]));
@@ -481,7 +495,9 @@ fn scatter(site: &Site, force: DVec3, place: &[u32], y: &mut [Vec6]) {
 }
 
 fn gather(site: &Site, place: &[u32], z: &[Vec6]) -> DVec3 {
-    (0..site.count).map(|k| site.jacobian[k].transpose() * DVec3::from_slice(&z[place[site.node[k] as usize] as usize][..3])).sum()
+    (0..site.count)
+        .map(|k| site.jacobian[k].transpose() * DVec3::from_slice(&z[place[site.node[k] as usize] as usize][..3]))
+        .sum()
 }
 
 /// Eliminates the first of `w` rows and columns of blocks. False when a pivot is not positive.
@@ -659,10 +675,19 @@ mod tests {
         let mut sides = Vec::new();
         for k in 0..9 {
             let first = zone.start + k;
-            let blocks = if k % 3 == 0 { vec![first, first + 1] } else { vec![first, first + 1, zone.end - 2 - k, zone.end - 1 - k] };
-            let side: Vec<(usize, DMat3)> = blocks.iter().map(|b| (*b, DMat3::from_cols_array(&core::array::from_fn(|_| random(seed))))).collect();
+            let blocks = if k % 3 == 0 {
+                vec![first, first + 1]
+            } else {
+                vec![first, first + 1, zone.end - 2 - k, zone.end - 1 - k]
+            };
+            let side: Vec<(usize, DMat3)> =
+                blocks.iter().map(|b| (*b, DMat3::from_cols_array(&core::array::from_fn(|_| random(seed))))).collect();
             let tangential = 0.01 + random(seed).abs();
-            sparse.push(side.iter().copied(), DVec3::new(0.01 + random(seed).abs(), tangential, tangential), DVec3::ONE);
+            sparse.push(
+                side.iter().copied(),
+                DVec3::new(0.01 + random(seed).abs(), tangential, tangential),
+                DVec3::ONE,
+            );
             sides.push(side);
         }
         assert!(sparse.prepare());
@@ -709,11 +734,18 @@ mod tests {
                 1 => Friction::Inside,
                 _ => Friction::Rim(0.6, -0.8, 0.2),
             };
-            let set = WorkingSet { pressed: (0..9).map(|k| (k + round) % 4 != 0).collect(), friction: (0..9).map(friction).collect() };
+            let set = WorkingSet {
+                pressed: (0..9).map(|k| (k + round) % 4 != 0).collect(),
+                friction: (0..9).map(friction).collect(),
+            };
             let b: Vec<f64> = (0..27).map(|_| random(seed)).collect();
             let mut change = vec![0.0; 27];
             for following in [false, true] {
-                let solved = if following { sparse.solve_following(&set, &b, &mu, &mut change) } else { sparse.solve_set(&set, &b, 0.0, &mut change) };
+                let solved = if following {
+                    sparse.solve_following(&set, &b, &mu, &mut change)
+                } else {
+                    sparse.solve_set(&set, &b, 0.0, &mut change)
+                };
                 assert!(solved);
                 let gradient: Vec<f64> = times(&s, &change).iter().zip(&b).map(|(a, b)| a + b).collect();
                 for c in 0..9 {
@@ -730,7 +762,10 @@ mod tests {
                         Friction::Rim(y, z, turn) => {
                             let radial = l[1] * y + l[2] * z - if following { mu[c] * l[0] } else { 0.0 };
                             let along = l[2] * y - l[1] * z;
-                            assert!(none(radial) && none(g[2] * y - g[1] * z + turn * along), "contact {c}: {l:?} {g:?}");
+                            assert!(
+                                none(radial) && none(g[2] * y - g[1] * z + turn * along),
+                                "contact {c}: {l:?} {g:?}"
+                            );
                         }
                     }
                 }

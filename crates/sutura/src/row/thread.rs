@@ -1,15 +1,17 @@
-//! Contact of thread with thread: the rows, their memory, and where new ones are needed. Their forces come from the small contact problem
-//! ([`couple`]).
+//! Contact of thread with thread: the rows, their memory, and where new ones are needed. Their forces come from the
+//! small contact problem ([`couple`]).
 //!
-//! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two pieces too near,
-//! another row is added at their present closest places.
+//! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two
+//! pieces too near, another row is added at their present closest places.
 //!
-//! Friction acts at the centerline, as the normal force does. It does not turn a thread about its own axis: threads slide on each other and do
-//! not roll. (Spin has next to no inertia and, on a thread whose ends are free to turn, no stiffness: the compliance it adds to the small
-//! problem is a thousand times the rest, and the solve does not converge.) Nor has it an arm about the other two: a thread drawn over a post of
-//! radius R would slide at its surface by R / (R + r) of its way only, and over an edge not at all.
+//! Friction acts at the centerline, as the normal force does. It does not turn a thread about its own axis: threads
+//! slide on each other and do not roll. (Spin has next to no inertia and, on a thread whose ends are free to turn, no
+//! stiffness: the compliance it adds to the small problem is a thousand times the rest, and the solve does not
+//! converge.) Nor has it an arm about the other two: a thread drawn over a post of radius R would slide at its surface
+//! by R / (R + r) of its way only, and over an edge not at all.
 //!
-//! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the next substep.
+//! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the
+//! next substep.
 //!
 //! [`couple`]: crate::row::couple
 
@@ -50,7 +52,8 @@ pub(crate) struct ThreadRow {
     pub force: DVec3,
     /// Left out of the small problem, it was violated.
     wanted: bool,
-    /// Clearance already missing at the start: what its force does not explain is won back over a few substeps, not at once.
+    /// Clearance already missing at the start: what its force does not explain is won back over a few substeps, not at
+    /// once.
     start_gap: f64,
     /// Depth to which its force at the start presses \[m\].
     carried: f64,
@@ -58,11 +61,13 @@ pub(crate) struct ThreadRow {
 
 impl ThreadRow {
     fn new(model: &Model, start: &[DVec3], a: usize, b: usize, s: f64, t: f64, normal: DVec3) -> Self {
-        let (ra, rb) = (model.rods.at(model.rod_of[a]).expect("living"), model.rods.at(model.rod_of[b]).expect("living"));
+        let (ra, rb) =
+            (model.rods.at(model.rod_of[a]).expect("living"), model.rods.at(model.rod_of[b]).expect("living"));
         let f = model.friction_between(ra.surface, rb.surface);
         // Tangents along and across the mean direction of a: any pair will do, this one turns with the thread.
         let along = start[a + 1] - start[a];
-        let t1 = (along - normal * normal.dot(along)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
+        let t1 =
+            (along - normal * normal.dot(along)).try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());
         let sum = ra.radius + rb.radius;
         let modulus = 1.0 / (1.0 / ra.material.contact_modulus() + 1.0 / rb.material.contact_modulus());
         let hertz = 4.0 / 3.0 * modulus * (ra.radius * rb.radius).sqrt().sqrt();
@@ -132,7 +137,8 @@ impl ThreadRow {
     }
 }
 
-/// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's forces.
+/// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's
+/// forces.
 pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     let Scratch { candidates, start, rows, .. } = scratch;
     rows.threads.clear();
@@ -195,8 +201,9 @@ pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
     share(&mut rows.threads, start);
 }
 
-/// Rows that bear on one another's patch bear together what one would: a thread that crosses another one at a joint of it lies in a notch, between two of them, and
-/// short elements along each other have several. Hertz' law is that of the patch, so each has its part of it.
+/// Rows that bear on one another's patch bear together what one would: a thread that crosses another one at a joint of
+/// it lies in a notch, between two of them, and short elements along each other have several. Hertz' law is that of the
+/// patch, so each has its part of it.
 fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
     let at = |e: usize, s: f64| start[e].lerp(start[e + 1], s);
     for k in 0..rows.len() {
@@ -210,7 +217,9 @@ fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
         let from = rows.partition_point(|r| r.place().0 < row.place().0 - reach);
         let (mut sum, mut squares) = (0.0, 0.0);
         for r in rows[from..].iter().take_while(|r| r.place().0 <= row.place().0 + reach) {
-            let apart = (at(r.a, r.s) - at(row.a, row.s)).length_squared().max((at(r.b, r.t) - at(row.b, row.t)).length_squared());
+            let apart = (at(r.a, r.s) - at(row.a, row.s))
+                .length_squared()
+                .max((at(r.b, r.t) - at(row.b, row.t)).length_squared());
             if apart < patch * patch && r.axes[0].dot(row.axes[0]) > params::SAME_PATCH {
                 let near = 1.0 - apart / (patch * patch);
                 sum += near * r.force.x;
@@ -227,10 +236,18 @@ fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
     }
 }
 
-/// Where two pieces are taken to touch: where they last did, as long as that is about as near as their closest places `c`. (Within both pieces the
-/// direction is the same.) The closest places of pieces that are nearly parallel run along them with the least tilt. A row that follows moves the force
-/// with it, which tilts them back, to and fro from substep to substep.
-fn keep_place(old: &[ThreadContact], start: &[DVec3], a: usize, b: usize, c: &segment::Closest, radius: f64) -> (f64, f64) {
+/// Where two pieces are taken to touch: where they last did, as long as that is about as near as their closest places
+/// `c`. (Within both pieces the direction is the same.) The closest places of pieces that are nearly parallel run along
+/// them with the least tilt. A row that follows moves the force with it, which tilts them back, to and fro from substep
+/// to substep.
+fn keep_place(
+    old: &[ThreadContact],
+    start: &[DVec3],
+    a: usize,
+    b: usize,
+    c: &segment::Closest,
+    radius: f64,
+) -> (f64, f64) {
     let inside = |x: f64| x > 0.0 && x < 1.0;
     let Some(k) = nearest_known(old, a, b, c.s, c.t).filter(|_| inside(c.s) && inside(c.t)) else { return (c.s, c.t) };
     let apart = start[a].lerp(start[a + 1], k.s) - start[b].lerp(start[b + 1], k.t);
@@ -239,9 +256,10 @@ fn keep_place(old: &[ThreadContact], start: &[DVec3], a: usize, b: usize, c: &se
     (c.s + (k.s - c.s) * part, c.t + (k.t - c.t) * part)
 }
 
-/// Whether the element `other`, which is touched at the place `s` of element `e`, `apart` from there, lies over the neighbor of `e`, which has its own
-/// row. A row's plane is fixed over the substep: one that leans toward what slides along the thread is a wall at half of the way to the joint. Of a
-/// thread that folds back over itself the neighbor may be one that cannot touch: only a pair among the candidates has a row.
+/// Whether the element `other`, which is touched at the place `s` of element `e`, `apart` from there, lies over the
+/// neighbor of `e`, which has its own row. A row's plane is fixed over the substep: one that leans toward what slides
+/// along the thread is a wall at half of the way to the joint. Of a thread that folds back over itself the neighbor may
+/// be one that cannot touch: only a pair among the candidates has a row.
 fn leans(model: &Model, candidates: &Candidates, x: &[DVec3], e: usize, s: f64, other: usize, apart: DVec3) -> bool {
     let (neighbor, along) = match s {
         0.0 if e > 0 && model.is_element(e - 1) => (e - 1, x[e - 1] - x[e]),
@@ -249,18 +267,23 @@ fn leans(model: &Model, candidates: &Candidates, x: &[DVec3], e: usize, s: f64, 
         _ => return false,
     };
     let pair = (neighbor.min(other) as u32, neighbor.max(other) as u32);
-    (1e-6..1.0).contains(&(apart.dot(along) / along.length_squared())) && candidates.threads.binary_search(&pair).is_ok()
+    (1e-6..1.0).contains(&(apart.dot(along) / along.length_squared()))
+        && candidates.threads.binary_search(&pair).is_ok()
 }
 
 /// The last contact on the same pair of elements that is nearest in place.
 fn nearest_known(old: &[ThreadContact], a: usize, b: usize, s: f64, t: f64) -> Option<ThreadContact> {
     let from = old.partition_point(|c| (c.a as usize, c.b as usize) < (a, b));
     let far = |c: &ThreadContact| (c.s - s).abs() + (c.t - t).abs();
-    old[from..].iter().take_while(|c| (c.a as usize, c.b as usize) == (a, b)).min_by(|x, y| far(x).total_cmp(&far(y))).copied()
+    old[from..]
+        .iter()
+        .take_while(|c| (c.a as usize, c.b as usize) == (a, b))
+        .min_by(|x, y| far(x).total_cmp(&far(y)))
+        .copied()
 }
 
-/// Leaves one of rows at the same two places (neighboring elements share a particle). Only those: a row between neighbors guards
-/// what its neighbor does not.
+/// Leaves one of rows at the same two places (neighboring elements share a particle). Only those: a row between
+/// neighbors guards what its neighbor does not.
 fn merge(rows: &mut Vec<ThreadRow>) {
     rows.sort_unstable_by(|x, y| x.place().0.total_cmp(&y.place().0).then(x.place().1.total_cmp(&y.place().1)));
     rows.dedup_by(|x, y| {
@@ -269,7 +292,8 @@ fn merge(rows: &mut Vec<ThreadRow>) {
     });
 }
 
-/// Gives each old contact's force and anchor to the row that is nearest to it along both threads, within an element and a half.
+/// Gives each old contact's force and anchor to the row that is nearest to it along both threads, within an element and
+/// a half.
 fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
     for c in old {
         let (pa, pb) = (f64::from(c.a) + c.s, f64::from(c.b) + c.t);
@@ -296,7 +320,13 @@ fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut [ThreadRow], entries: &mut Vec<Entry>) {
+pub(crate) fn enter(
+    state: &State,
+    start: &Start<'_>,
+    step: &[DVec3],
+    rows: &mut [ThreadRow],
+    entries: &mut Vec<Entry>,
+) {
     for (k, row) in rows.iter_mut().enumerate() {
         // Where the step without contact forces would leave the row.
         let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
@@ -326,9 +356,10 @@ pub(crate) fn enter(state: &State, start: &Start<'_>, step: &[DVec3], rows: &mut
     }
 }
 
-/// Factor on the update so that no pair of centerlines comes nearer than half of the least distance allowed on the straight way from the start of the substep to
-/// where the update leads; a pair that would goes most of the way there. (Only that way counts, as where a substep is accepted: a prediction may have brought two
-/// pieces into or past each other, and the way back is free.)
+/// Factor on the update so that no pair of centerlines comes nearer than half of the least distance allowed on the
+/// straight way from the start of the substep to where the update leads; a pair that would goes most of the way there.
+/// (Only that way counts, as where a substep is accepted: a prediction may have brought two pieces into or past each
+/// other, and the way back is free.)
 pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
     let (x, start, step) = (&state.position, &scratch.start, &scratch.step);
     let mut scale = scale;
@@ -377,7 +408,8 @@ fn keeps_apart(from: [DVec3; 4], way: [DVec3; 4], sum: f64) -> bool {
     false
 }
 
-/// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was added, or when one was left out of the small problem.
+/// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was
+/// added, or when one was left out of the small problem.
 pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
     let Scratch { candidates, start, rows, .. } = scratch;
     let x = &state.position;
@@ -387,7 +419,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         let (a, b) = (*a as usize, *b as usize);
         let sum = scratch.radius[a] + scratch.radius[b];
         let least = sum * (1.0 + params::KEEP - params::SLACK);
-        let middle = 0.5 * (x[a] + x[a + 1] - x[b] - x[b + 1]).length() - 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
+        let middle = 0.5 * (x[a] + x[a + 1] - x[b] - x[b + 1]).length()
+            - 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
         if middle > least {
             continue;
         }
@@ -416,9 +449,12 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
     let known = rows.threads.len();
     let mut found = false;
     for row in fresh.iter() {
-        let same = rows.threads[..known]
-            .iter_mut()
-            .find(|r| r.key() == row.key() && (r.s - row.s).abs() < 0.02 && (r.t - row.t).abs() < 0.02 && r.axes[0].dot(row.axes[0]) > 0.9999);
+        let same = rows.threads[..known].iter_mut().find(|r| {
+            r.key() == row.key()
+                && (r.s - row.s).abs() < 0.02
+                && (r.t - row.t).abs() < 0.02
+                && r.axes[0].dot(row.axes[0]) > 0.9999
+        });
         match same {
             Some(old) => found |= !core::mem::replace(&mut old.wanted, true),
             None => {
@@ -430,7 +466,8 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
     found
 }
 
-/// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left undone.
+/// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left
+/// undone.
 pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
     let start = Start { position: &scratch.start, shape: &scratch.start_shape_pose };
     let mut contacts = core::mem::take(&mut state.thread_contacts);

@@ -1,9 +1,10 @@
-//! Welds: places of threads that share one point and one cross-section. Each is six unknowns at the border of the rods' system
-//! ([`border`](crate::row::border)): where it is, and how it is turned.
+//! Welds: places of threads that share one point and one cross-section. Each is six unknowns at the border of the rods'
+//! system ([`border`](crate::row::border)): where it is, and how it is turned.
 //!
-//! The particles there have no unknowns of their own: their rows and columns of the Newton matrix, inertia and elements beside them included, are
-//! added up and become the weld's, which is elimination in another order and loses nothing. The cross-section has no inertia; each frame beside it
-//! is tied to it by half a joint, as to a clamp, so that two ends welded are one thread to second order in the element length.
+//! The particles there have no unknowns of their own: their rows and columns of the Newton matrix, inertia and elements
+//! beside them included, are added up and become the weld's, which is elimination in another order and loses nothing.
+//! The cross-section has no inertia; each frame beside it is tied to it by half a joint, as to a clamp, so that two
+//! ends welded are one thread to second order in the element length.
 
 use crate::math::{exp, skew};
 use crate::model::Model;
@@ -47,8 +48,8 @@ impl Welds {
         SIX * self.welds.len()
     }
 
-    /// Lists welds and half joints at the start of a solve of length `h`, before anything has moved. Damping acts over the solve, also where it is one of
-    /// two: a cross-section without inertia has no rate of its own.
+    /// Lists welds and half joints at the start of a solve of length `h`, before anything has moved. Damping acts over
+    /// the solve, also where it is one of two: a cross-section without inertia has no rate of its own.
     pub fn begin(&mut self, model: &Model, state: &State, joint_on: &mut [bool], h: f64) {
         self.welds.clear();
         self.joints.clear();
@@ -124,12 +125,18 @@ impl Welds {
 
     /// Moment of the half joints on the cross-section of a weld.
     pub fn moment(&self, slot: u32) -> DVec3 {
-        self.joints.iter().filter(|j| self.welds[j.weld].slot == slot).map(|j| if j.half.first { j.moment } else { -j.moment }).sum()
+        self.joints
+            .iter()
+            .filter(|j| self.welds[j.weld].slot == slot)
+            .map(|j| if j.half.first { j.moment } else { -j.moment })
+            .sum()
     }
 
     /// Greatest turn of the last step \[rad\], squared.
     pub fn turn_squared(&self, first: usize, border: &Border) -> f64 {
-        (0..self.welds.len()).map(|k| vector(border, first + SIX * k + 3).length_squared()).fold(0.0, |a, b| if b <= a { a } else { b })
+        (0..self.welds.len())
+            .map(|k| vector(border, first + SIX * k + 3).length_squared())
+            .fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
     /// Turns the cross-sections by their part of the step. (Their particles are moved with the others.)
@@ -238,7 +245,8 @@ fn add_block(border: &mut Border, row: usize, col: usize, m: &DMat3) {
     }
 }
 
-/// Orientation of a weld's cross-section, between the frames before and after it, that leaves both half joints with the same moment.
+/// Orientation of a weld's cross-section, between the frames before and after it, that leaves both half joints with the
+/// same moment.
 pub(crate) fn between(before: DQuat, after: DQuat, rest_half: DQuat) -> DQuat {
     let turn = (before * rest_half).conjugate() * (after * rest_half.conjugate());
     (before * rest_half * crate::math::half(turn)).normalize()

@@ -34,11 +34,13 @@ pub struct State {
     pub(crate) velocity: Vec<DVec3>,
     pub(crate) orientation: Vec<DQuat>,
     pub(crate) angular_velocity: Vec<DVec3>,
-    /// Rates of the two, without damping, where the integrator needs them and `onset` says that they are known; else empty.
+    /// Rates of the two, without damping, where the integrator needs them and `onset` says that they are known; else
+    /// empty.
     pub(crate) acceleration: Vec<DVec3>,
     pub(crate) angular_acceleration: Vec<DVec3>,
     pub(crate) onset: Onset,
-    /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the first guess of inextensible elements.
+    /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the first guess of
+    /// inextensible elements.
     pub(crate) tension: Vec<f64>,
     /// Plastic bend and twist of the joint before each element \[rad\], part of the rest strain.
     pub(crate) plastic: Vec<DVec3>,
@@ -146,7 +148,8 @@ pub(crate) struct ShapeContact {
 impl ThreadContact {
     /// Puts contacts in the order in which they are looked up.
     pub(crate) fn sort(contacts: &mut [Self]) {
-        contacts.sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
+        contacts
+            .sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
     }
 }
 

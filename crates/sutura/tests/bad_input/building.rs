@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_usable, point, step, straight, thread};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Closure, Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, RestShape, RodSpec, Section,
-    Settings, ShapeMotion, ShapeSpec, Shear, World,
+    Closure, Drive, Error, Friction, Geometry, GripSpec, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose,
+    Profile, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, World,
 };
 
 /// An error of the kind that names a field, and the field.
@@ -60,9 +60,14 @@ fn settings_out_of_range() {
 #[test]
 fn friction_out_of_range() {
     let (mut world, _) = thread(Settings::default());
-    for (field, stick, slide) in
-        [("stick", -0.1, -0.2), ("stick", NAN, 0.0), ("stick", INF, 0.0), ("slide", 0.3, 0.4), ("slide", 0.3, -0.1), ("slide", 0.3, NAN)]
-    {
+    for (field, stick, slide) in [
+        ("stick", -0.1, -0.2),
+        ("stick", NAN, 0.0),
+        ("stick", INF, 0.0),
+        ("slide", 0.3, 0.4),
+        ("slide", 0.3, -0.1),
+        ("slide", 0.3, NAN),
+    ] {
         assert_eq!(invalid(world.set_friction(0, 1, Friction { stick, slide })), field);
     }
 }
@@ -80,7 +85,9 @@ fn threads_that_cannot_be() {
         change(&mut material);
         RodSpec { material, ..straight() }
     };
-    let plastic = |yield_curvature, yield_twist, hardening| made_of(&|m| m.plasticity = Some(Plasticity { yield_curvature, yield_twist, hardening }));
+    let plastic = |yield_curvature, yield_twist, hardening| {
+        made_of(&|m| m.plasticity = Some(Plasticity { yield_curvature, yield_twist, hardening }))
+    };
     let mut bad = vec![
         ("centerline", with(&|s| s.centerline.clear())),
         ("centerline", with(&|s| s.centerline.truncate(1))),
@@ -96,8 +103,14 @@ fn threads_that_cannot_be() {
         ("frames[0]", with(&|s| s.frames = Some(vec![DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0); 20]))),
         ("rest.lengths", with(&|s| s.rest = RestShape::Given { lengths: Some(vec![1e-3; 19]), darboux: None })),
         ("rest.darboux", with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::ZERO; 20]) })),
-        ("rest.darboux[0]", with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::X * 1e6; 19]) })),
-        ("rest.darboux[0]", with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::splat(NAN); 19]) })),
+        (
+            "rest.darboux[0]",
+            with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::X * 1e6; 19]) }),
+        ),
+        (
+            "rest.darboux[0]",
+            with(&|s| s.rest = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::splat(NAN); 19]) }),
+        ),
     ];
     bad.push(("along.size[1]", with(&|s| s.along.size = Profile(vec![(0.1, 1.0), (0.1, 1.0)]))));
     bad.push(("pretwist", with(&|s| s.pretwist = 1e6)));
@@ -113,7 +126,10 @@ fn threads_that_cannot_be() {
         bad.push(("along.modulus[0]", with(&|s| s.along.modulus = Profile(vec![(0.0, x)]))));
         bad.push(("along.density[0]", with(&|s| s.along.density = Profile(vec![(0.0, x)]))));
         bad.push(("radius", with(&|s| s.radius = x)));
-        bad.push(("rest.lengths[0]", with(&|s| s.rest = RestShape::Given { lengths: Some(vec![x; 20]), darboux: None })));
+        bad.push((
+            "rest.lengths[0]",
+            with(&|s| s.rest = RestShape::Given { lengths: Some(vec![x; 20]), darboux: None }),
+        ));
         bad.push(("young_modulus", made_of(&|m| m.young_modulus = x)));
         bad.push(("density", made_of(&|m| m.density = x)));
         bad.push(("shear_modulus", made_of(&|m| m.shear = Shear::Modulus(x))));
@@ -142,7 +158,10 @@ fn threads_that_cannot_be() {
 fn a_closed_thread_that_turns_back_on_itself() {
     let (material, radius) = t1();
     let (mut world, _) = thread(Settings::default());
-    let closed = |centerline: Vec<DVec3>| RodSpec { closure: Some(Closure::default()), ..RodSpec::new(centerline, radius, material.clone()) };
+    let closed = |centerline: Vec<DVec3>| RodSpec {
+        closure: Some(Closure::default()),
+        ..RodSpec::new(centerline, radius, material.clone())
+    };
     // A line: back from its end through all of it. A fold in a ring.
     let line: Vec<DVec3> = (0..=20).map(|i| DVec3::X * (0.0025 * f64::from(i))).collect();
     assert_eq!(invalid(world.insert_rod(&closed(line))), "centerline[20]");
@@ -168,15 +187,22 @@ fn shapes_that_cannot_be() {
     bad.push(("triangles", Geometry::Mesh { vertices: corners.clone(), triangles: vec![] }));
     bad.push(("triangles[0]", Geometry::Mesh { vertices: corners.clone(), triangles: vec![[0, 1, 3]] }));
     bad.push(("triangles[0]", Geometry::Mesh { vertices: corners.clone(), triangles: vec![[0, 1, 1]] }));
-    bad.push(("triangles[0]", Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::X * 2.0], triangles: vec![[0, 1, 2]] }));
-    bad.push(("vertices[1]", Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::splat(NAN), DVec3::Y], triangles: vec![[0, 1, 2]] }));
+    bad.push((
+        "triangles[0]",
+        Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::X * 2.0], triangles: vec![[0, 1, 2]] },
+    ));
+    bad.push((
+        "vertices[1]",
+        Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::splat(NAN), DVec3::Y], triangles: vec![[0, 1, 2]] },
+    ));
     for (field, geometry) in bad {
         assert_eq!(invalid(world.insert_shape(&ShapeSpec::fixed(geometry, Pose::IDENTITY))), field);
     }
     for pose in bad_poses() {
         assert_eq!(invalid(world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, pose))), "pose");
     }
-    let fixed = world.insert_shape(&ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1))).unwrap();
+    let fixed =
+        world.insert_shape(&ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1))).unwrap();
     assert_eq!(invalid(world.set_shape_pose(fixed, Pose::IDENTITY)), "motion");
     for (field, motion) in [
         ("motion.force", ShapeMotion::Pushed { direction: DVec3::X, force: NAN, speed_limit: 1.0 }),
@@ -186,7 +212,10 @@ fn shapes_that_cannot_be() {
         ("motion.direction", ShapeMotion::Pushed { direction: DVec3::splat(NAN), force: 1.0, speed_limit: 1.0 }),
     ] {
         assert_eq!(invalid(world.set_shape_motion(fixed, motion)), field);
-        assert_eq!(invalid(world.insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY) })), field);
+        assert_eq!(
+            invalid(world.insert_shape(&ShapeSpec { motion, ..ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY) })),
+            field
+        );
     }
     world.set_shape_motion(fixed, ShapeMotion::Driven).unwrap();
     for pose in bad_poses() {
@@ -224,7 +253,10 @@ fn grips_that_cannot_be() {
         assert_eq!(invalid(world.insert_load(&LoadSpec { rod, kind: point(place, DVec3::ZERO) })), field);
     }
     for ramp in [NAN, INF, -0.1] {
-        assert_eq!(invalid(world.insert_grip(&GripSpec { ramp, ..GripSpec::new(rod, Place::Start, Hold::Pin) })), "ramp");
+        assert_eq!(
+            invalid(world.insert_grip(&GripSpec { ramp, ..GripSpec::new(rod, Place::Start, Hold::Pin) })),
+            "ramp"
+        );
     }
     let grip = world.insert_grip(&GripSpec::new(rod, Place::Start, Hold::Jaw)).unwrap();
     // What one grip holds no other can: the jaw has both particles.
@@ -279,7 +311,10 @@ fn handles_of_what_is_gone() {
     let (mut world, rod) = thread(Settings::default());
     let grip = world.insert_grip(&GripSpec::new(rod, Place::Start, Hold::Pin)).unwrap();
     let load = world.insert_load(&LoadSpec { rod, kind: point(Place::End, DVec3::X) }).unwrap();
-    let sphere = ShapeSpec { motion: ShapeMotion::Driven, ..ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1)) };
+    let sphere = ShapeSpec {
+        motion: ShapeMotion::Driven,
+        ..ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1))
+    };
     let shape = world.insert_shape(&sphere).unwrap();
     world.step(DT);
     world.remove_rod(rod).unwrap();
@@ -320,7 +355,9 @@ fn removing_a_thread_leaves_the_others_as_they_are() {
     let mut rods = Vec::new();
     for k in 0..3 {
         let from = DVec3::Y * (0.01 * f64::from(k));
-        let rod = world.insert_rod(&RodSpec::straight(from, from + DVec3::X * 0.03, 10 + 3 * k as usize, radius, material.clone())).unwrap();
+        let rod = world
+            .insert_rod(&RodSpec::straight(from, from + DVec3::X * 0.03, 10 + 3 * k as usize, radius, material.clone()))
+            .unwrap();
         let grip = world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
         rods.push((rod, grip));
     }

@@ -1,5 +1,5 @@
-//! Whatever a world is given: an error that says what was wrong, or an incident in the report; never a panic, a hang, or a number that is
-//! not finite; and afterwards a world that can still be used.
+//! Whatever a world is given: an error that says what was wrong, or an incident in the report; never a panic, a hang,
+//! or a number that is not finite; and afterwards a world that can still be used.
 
 mod building;
 mod motions;
@@ -40,11 +40,17 @@ fn assert_finite(world: &World) {
     for rod in world.view().rods() {
         let vectors = rod.positions().iter().chain(rod.velocities()).chain(rod.angular_velocities());
         assert!(vectors.into_iter().all(|v| v.is_finite()), "a position or velocity is not finite");
-        assert!(rod.orientations().iter().all(|q| q.is_finite() && (q.length() - 1.0).abs() < 1e-6), "a frame is not a rotation");
+        assert!(
+            rod.orientations().iter().all(|q| q.is_finite() && (q.length() - 1.0).abs() < 1e-6),
+            "a frame is not a rotation"
+        );
         assert!((0..rod.n_elements()).all(|e| rod.internal_force(e).is_finite()), "a force is not finite");
     }
     assert!(world.view().shapes().all(|s| s.pose.position.is_finite() && s.pose.orientation.is_finite()));
-    assert!(world.contacts().all(|c| c.force.is_finite() && c.point.is_finite() && c.normal.is_finite()), "a contact force is not finite");
+    assert!(
+        world.contacts().all(|c| c.force.is_finite() && c.point.is_finite() && c.normal.is_finite()),
+        "a contact force is not finite"
+    );
 }
 
 /// One step, with its work held against the bound that the settings imply, and the state looked at.
@@ -63,7 +69,10 @@ fn step(world: &mut World, dt: f64) -> StepReport {
 
 /// Whether a step came to its end.
 fn went_through(report: &StepReport) -> bool {
-    !report.incidents.iter().any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite | IncidentKind::BadInput { .. }))
+    !report
+        .incidents
+        .iter()
+        .any(|i| matches!(i.kind, IncidentKind::Stuck { .. } | IncidentKind::NotFinite | IncidentKind::BadInput { .. }))
 }
 
 /// Steps on; at the end the world moves again. `what` is for the message.

@@ -5,8 +5,8 @@ use crate::{DT, assert_finite, assert_usable, step, straight, thread};
 use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, Place, Pose, RestShape, Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, StepReport,
-    Stretch, World,
+    Geometry, Grip, GripSpec, Handle, Hold, IncidentKind, Material, Place, Pose, RestShape, Rod, RodSpec, Settings,
+    ShapeMotion, ShapeSpec, StepReport, Stretch, World,
 };
 
 /// Few halvings: being stuck then takes 31 attempts a substep and not 511.
@@ -20,11 +20,13 @@ fn knotted() -> (World, Handle<Rod>, [Handle<Grip>; 2]) {
     let material = Material { bend_damping: 0.01, ..Material::elastic(2e9, 1150.0) };
     let mut world = World::new(hasty()).unwrap();
     let rod = world.insert_rod(&RodSpec::new(overhand(600.0 * radius, 150), radius, material)).unwrap();
-    let pins = [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(rod, place, Hold::Pin)).unwrap());
+    let pins =
+        [Place::Start, Place::End].map(|place| world.insert_grip(&GripSpec::at_once(rod, place, Hold::Pin)).unwrap());
     (world, rod, pins)
 }
 
-/// One step that is watched, for a motion that is not to be followed: either the audit finds nothing crossed, or the report says so.
+/// One step that is watched, for a motion that is not to be followed: either the audit finds nothing crossed, or the
+/// report says so.
 fn audited_step(world: &mut World, dt: f64) -> StepReport {
     let mut audit = Audit::new();
     audit.observe(world.view());
@@ -43,7 +45,8 @@ fn a_pin_that_jumps_through_a_knot() {
     for _ in 0..6 {
         for (pin, way) in pins.iter().zip([-1.0, 1.0]) {
             let at = world.grip_pose(*pin).unwrap().position;
-            let axis = (world.grip_pose(pins[1]).unwrap().position - world.grip_pose(pins[0]).unwrap().position).normalize();
+            let axis =
+                (world.grip_pose(pins[1]).unwrap().position - world.grip_pose(pins[0]).unwrap().position).normalize();
             world.set_grip_pose(*pin, Pose::at(at + axis * (way * 1e-3))).unwrap();
         }
         assert!(step(&mut world, DT).incidents.is_empty());
@@ -66,7 +69,10 @@ fn a_pin_that_jumps_in_no_time_is_reported() {
     let at = world.grip_pose(pins[0]).unwrap().position;
     world.set_grip_pose(pins[0], Pose::at(at + DVec3::Y * 0.1)).unwrap();
     let report = audited_step(&mut world, 5e-4);
-    let jump = report.incidents.iter().find_map(|i| if let IncidentKind::Teleport { distance } = i.kind { Some(distance) } else { None });
+    let jump = report
+        .incidents
+        .iter()
+        .find_map(|i| if let IncidentKind::Teleport { distance } = i.kind { Some(distance) } else { None });
     assert!(jump.is_some_and(|d| (d - 0.1).abs() < 1e-9), "{:?}", report.incidents);
     for pin in pins {
         world.remove_grip(pin).unwrap();
@@ -82,12 +88,17 @@ fn a_clamp_that_jumps_through_a_shape() {
         (Geometry::Box { half_sides: DVec3::new(0.05, 0.05, 1e-4) }, DQuat::IDENTITY),
         (Geometry::Cylinder { radius: 5e-3, half_length: 0.05 }, across),
         (
-            Geometry::Mesh { vertices: vec![DVec3::new(-0.1, -0.1, 0.0), DVec3::new(0.1, -0.1, 0.0), DVec3::new(0.0, 0.1, 0.0)], triangles: vec![[0, 1, 2]] },
+            Geometry::Mesh {
+                vertices: vec![DVec3::new(-0.1, -0.1, 0.0), DVec3::new(0.1, -0.1, 0.0), DVec3::new(0.0, 0.1, 0.0)],
+                triangles: vec![[0, 1, 2]],
+            },
             DQuat::IDENTITY,
         ),
     ] {
         let (mut world, rod) = thread(hasty());
-        let shape = world.insert_shape(&ShapeSpec::fixed(geometry.clone(), Pose::new(DVec3::NEG_Z * 0.01, orientation))).unwrap();
+        let shape = world
+            .insert_shape(&ShapeSpec::fixed(geometry.clone(), Pose::new(DVec3::NEG_Z * 0.01, orientation)))
+            .unwrap();
         let clamp = world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
         let pose = world.grip_pose(clamp).unwrap();
         world.set_grip_pose(clamp, Pose::new(pose.position - DVec3::Z * 0.1, pose.orientation)).unwrap();
@@ -115,7 +126,10 @@ fn a_shape_that_jumps_onto_a_thread() {
                 world.insert_grip(&GripSpec::at_once(rod, place, Hold::Clamp)).unwrap();
             }
         }
-        let spec = ShapeSpec { motion: ShapeMotion::Driven, ..ShapeSpec::fixed(geometry.clone(), Pose::at(DVec3::new(0.025, 0.0, 0.1))) };
+        let spec = ShapeSpec {
+            motion: ShapeMotion::Driven,
+            ..ShapeSpec::fixed(geometry.clone(), Pose::at(DVec3::new(0.025, 0.0, 0.1)))
+        };
         let shape = world.insert_shape(&spec).unwrap();
         step(&mut world, DT);
         world.set_shape_pose(shape, Pose::at(DVec3::new(0.025, 0.0, 0.0))).unwrap();
@@ -151,12 +165,17 @@ fn threads_inserted_in_one_another() {
 #[test]
 fn a_thread_that_runs_back_into_itself() {
     let (material, radius) = t1();
-    let ring: Vec<DVec3> = (0..=24).map(|i| DQuat::from_rotation_z(core::f64::consts::TAU * f64::from(i) / 24.0) * DVec3::X * 5e-3).collect();
+    let ring: Vec<DVec3> = (0..=24)
+        .map(|i| DQuat::from_rotation_z(core::f64::consts::TAU * f64::from(i) / 24.0) * DVec3::X * 5e-3)
+        .collect();
     let there_and_back: Vec<DVec3> = (0..=20i32).map(|i| DVec3::X * (1e-3 * f64::from(10 - (i - 10).abs()))).collect();
     for (what, points) in [("closed ring", ring), ("there and back", there_and_back)] {
         for rest in [RestShape::Straight, RestShape::AsInserted] {
             let mut world = World::new(hasty()).unwrap();
-            let Ok(rod) = world.insert_rod(&RodSpec { rest, ..RodSpec::new(points.clone(), radius, material.clone()) }) else { continue };
+            let Ok(rod) = world.insert_rod(&RodSpec { rest, ..RodSpec::new(points.clone(), radius, material.clone()) })
+            else {
+                continue;
+            };
             for _ in 0..5 {
                 step(&mut world, DT);
             }
@@ -195,7 +214,10 @@ fn an_inextensible_thread_pulled_beyond_its_length() {
         for by in [1e-4, 1e-2, 0.1] {
             let (material, radius) = t1();
             let mut world = World::new(hasty()).unwrap();
-            let spec = RodSpec { stretch: Stretch::Inextensible, ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, 20, radius, material) };
+            let spec = RodSpec {
+                stretch: Stretch::Inextensible,
+                ..RodSpec::straight(DVec3::ZERO, DVec3::X * 0.05, 20, radius, material)
+            };
             let rod = world.insert_rod(&spec).unwrap();
             world.insert_grip(&GripSpec::at_once(rod, Place::Start, hold)).unwrap();
             let end = world.insert_grip(&GripSpec::at_once(rod, Place::End, hold)).unwrap();
@@ -205,7 +227,11 @@ fn an_inextensible_thread_pulled_beyond_its_length() {
             for _ in 0..3 {
                 incidents += step(&mut world, DT).incidents.len();
             }
-            assert!(incidents > 0, "{hold:?} by {by}: the thread is longer by {}", world.rod(rod).unwrap().max_elongation());
+            assert!(
+                incidents > 0,
+                "{hold:?} by {by}: the thread is longer by {}",
+                world.rod(rod).unwrap().max_elongation()
+            );
             world.remove_grip(end).unwrap();
             for _ in 0..10 {
                 step(&mut world, DT);

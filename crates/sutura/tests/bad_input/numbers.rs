@@ -4,8 +4,8 @@ use crate::support::t1;
 use crate::{DT, INF, NAN, assert_finite, assert_usable, point, step, straight, thread};
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, Profile, RestShape, RodSpec, Section, Settings,
-    ShapeMotion, ShapeSpec, Shear, Stretch, World,
+    Along, Drive, Error, Geometry, GripSpec, Hold, IncidentKind, LoadKind, LoadSpec, Material, Place, Pose, Profile,
+    RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Stretch, World,
 };
 
 #[test]
@@ -15,7 +15,10 @@ fn time_steps_that_are_none() {
     let before = world.state_hash();
     for dt in [0.0, -0.0, -DT, NAN, INF, -INF] {
         let report = world.step(dt);
-        assert!(matches!(report.incidents[..], [ref i] if matches!(i.kind, IncidentKind::BadInput { .. })), "{dt}: {report:?}");
+        assert!(
+            matches!(report.incidents[..], [ref i] if matches!(i.kind, IncidentKind::BadInput { .. })),
+            "{dt}: {report:?}"
+        );
         assert_eq!((report.substeps, report.newton_iterations, world.state_hash()), (0, 0, before), "{dt}");
     }
     assert_usable(&mut world, 2, "after them");
@@ -79,16 +82,29 @@ fn absurd(what: &str, build: impl FnOnce(&mut World) -> Result<(), Error>) {
 fn absurd_threads() {
     let (material, radius) = t1();
     for x in [1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300] {
-        let spec = |points: Vec<DVec3>, radius: f64, material: &Material| RodSpec::new(points, radius, material.clone());
+        let spec =
+            |points: Vec<DVec3>, radius: f64, material: &Material| RodSpec::new(points, radius, material.clone());
         let points = |l: f64| (0..=4).map(|i| DVec3::X * (l * f64::from(i) / 4.0)).collect::<Vec<_>>();
         let insert = |s: RodSpec| move |w: &mut World| w.insert_rod(&s).map(|_| ());
         absurd(&format!("radius {x:e}"), insert(spec(points(0.01), x, &material)));
         absurd(&format!("length {x:e}"), insert(spec(points(x), radius, &material)));
         absurd(&format!("all lengths {x:e}"), insert(spec(points(x), 0.01 * x, &material)));
-        absurd(&format!("density {x:e}"), insert(spec(points(0.01), radius, &Material { density: x, ..material.clone() })));
-        absurd(&format!("modulus {x:e}"), insert(spec(points(0.01), radius, &Material { young_modulus: x, ..material.clone() })));
-        absurd(&format!("shear modulus {x:e}"), insert(spec(points(0.01), radius, &Material { shear: Shear::Modulus(x), ..material.clone() })));
-        absurd(&format!("damping {x:e}"), insert(spec(points(0.01), radius, &Material { bend_damping: x, ..material.clone() })));
+        absurd(
+            &format!("density {x:e}"),
+            insert(spec(points(0.01), radius, &Material { density: x, ..material.clone() })),
+        );
+        absurd(
+            &format!("modulus {x:e}"),
+            insert(spec(points(0.01), radius, &Material { young_modulus: x, ..material.clone() })),
+        );
+        absurd(
+            &format!("shear modulus {x:e}"),
+            insert(spec(points(0.01), radius, &Material { shear: Shear::Modulus(x), ..material.clone() })),
+        );
+        absurd(
+            &format!("damping {x:e}"),
+            insert(spec(points(0.01), radius, &Material { bend_damping: x, ..material.clone() })),
+        );
         let thin = Section::Rectangle([x, 1e-4]);
         absurd(&format!("a side of {x:e}"), insert(RodSpec { section: thin, ..spec(points(0.01), radius, &material) }));
         let along = Along { modulus: Profile(vec![(0.0, 1.0), (0.01, x)]), ..Along::default() };
@@ -97,9 +113,14 @@ fn absurd_threads() {
         absurd(&format!("{x:e} away"), insert(spec(far, radius, &material)));
         let crossing = points(x).iter().map(|p| DVec3::new(0.5 * x, p.x - 0.5 * x, 0.0)).collect::<Vec<_>>();
         let two = [spec(points(x), 0.01 * x, &material), spec(crossing, 0.01 * x, &material)];
-        absurd(&format!("two that cross, all lengths {x:e}"), move |w| two.iter().try_for_each(|s| w.insert_rod(s).map(|_| ())));
+        absurd(&format!("two that cross, all lengths {x:e}"), move |w| {
+            two.iter().try_for_each(|s| w.insert_rod(s).map(|_| ()))
+        });
         let lengths = RestShape::Given { lengths: Some(vec![x; 4]), darboux: None };
-        absurd(&format!("rest length {x:e}"), insert(RodSpec { rest: lengths, ..spec(points(0.01), radius, &material) }));
+        absurd(
+            &format!("rest length {x:e}"),
+            insert(RodSpec { rest: lengths, ..spec(points(0.01), radius, &material) }),
+        );
     }
 }
 
@@ -167,8 +188,12 @@ fn absurd_loads_and_grips() {
         }
         absurd(&format!("a shape of {x:e}"), move |w| {
             w.insert_rod(&straight())?;
-            w.insert_shape(&ShapeSpec::fixed(Geometry::Box { half_sides: DVec3::splat(x) }, Pose::at(DVec3::NEG_Z * x)))?;
-            w.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: x, half_length: x }, Pose::at(DVec3::Z * x))).map(|_| ())
+            w.insert_shape(&ShapeSpec::fixed(
+                Geometry::Box { half_sides: DVec3::splat(x) },
+                Pose::at(DVec3::NEG_Z * x),
+            ))?;
+            w.insert_shape(&ShapeSpec::fixed(Geometry::Cylinder { radius: x, half_length: x }, Pose::at(DVec3::Z * x)))
+                .map(|_| ())
         });
         absurd(&format!("a shape pushed with {x:e}"), move |w| {
             w.insert_rod(&straight())?;

@@ -5,29 +5,42 @@ use crate::{DT, NAN, assert_finite, assert_usable, point, straight, thread};
 use proptest::prelude::*;
 use sutura::glam::DVec3;
 use sutura::{
-    Along, Drive, Error, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose, Profile, ReelLaw, ReelSpec, RestShape, Rod,
-    RodSpec, Section, Settings, ShapeMotion, ShapeSpec, WeldSpec, World,
+    Along, Drive, Error, Geometry, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Plasticity, Pose,
+    Profile, ReelLaw, ReelSpec, RestShape, Rod, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, WeldSpec, World,
 };
 
-/// A world with all that a snapshot holds: two threads that touch, on a plane, grips of all kinds, loads, a driven and a removed shape.
+/// A world with all that a snapshot holds: two threads that touch, on a plane, grips of all kinds, loads, a driven and
+/// a removed shape.
 fn full_world() -> World {
     let (material, radius) = t1();
     let mut world = World::new(Settings { halvings: 3, ..Settings::default() }).unwrap();
-    let gone = world.insert_shape(&ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1))).unwrap();
+    let gone =
+        world.insert_shape(&ShapeSpec::fixed(Geometry::Sphere { radius: 1e-3 }, Pose::at(DVec3::Z * 0.1))).unwrap();
     world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::IDENTITY)).unwrap();
     let ball = ShapeSpec::fixed(Geometry::Sphere { radius: 2e-3 }, Pose::at(DVec3::new(0.0, 0.01, 4e-3)));
     world.insert_shape(&ShapeSpec { motion: ShapeMotion::Driven, ..ball }).unwrap();
     world.remove_shape(gone).unwrap();
     let low = DVec3::Z * (1.04 * radius);
-    let plastic = Material { plasticity: Some(Plasticity { yield_curvature: 20.0, yield_twist: 20.0, hardening: 0.1 }), ..material.clone() };
-    let a = world.insert_rod(&RodSpec::straight(low - DVec3::X * 0.01, low + DVec3::X * 0.01, 8, radius, plastic)).unwrap();
+    let plastic = Material {
+        plasticity: Some(Plasticity { yield_curvature: 20.0, yield_twist: 20.0, hardening: 0.1 }),
+        ..material.clone()
+    };
+    let a =
+        world.insert_rod(&RodSpec::straight(low - DVec3::X * 0.01, low + DVec3::X * 0.01, 8, radius, plastic)).unwrap();
     let high = DVec3::Z * (3.1 * radius);
-    let b = world.insert_rod(&RodSpec::straight(high - DVec3::Y * 0.01, high + DVec3::Y * 0.01, 7, radius, material)).unwrap();
+    let b = world
+        .insert_rod(&RodSpec::straight(high - DVec3::Y * 0.01, high + DVec3::Y * 0.01, 7, radius, material))
+        .unwrap();
     world.insert_grip(&GripSpec::new(a, Place::Start, Hold::Clamp)).unwrap();
     world.insert_grip(&GripSpec::new(b, Place::Start, Hold::Pin)).unwrap();
     let drive = Drive::Force { direction: DVec3::Y, force: 0.01, speed_limit: 0.01 };
     world.insert_grip(&GripSpec { drive, ..GripSpec::new(b, Place::End, Hold::Jaw) }).unwrap();
-    world.insert_load(&LoadSpec { rod: b, kind: LoadKind::Mass { place: Place::Arc(0.004), mass: 1e-5, inertia: DVec3::ZERO } }).unwrap();
+    world
+        .insert_load(&LoadSpec {
+            rod: b,
+            kind: LoadKind::Mass { place: Place::Arc(0.004), mass: 1e-5, inertia: DVec3::ZERO },
+        })
+        .unwrap();
     world.insert_load(&LoadSpec { rod: a, kind: point(Place::End, DVec3::Z * 1e-5) }).unwrap();
     for _ in 0..6 {
         world.step(DT);
@@ -110,10 +123,24 @@ impl Parts {
     fn build(&self) -> (World, Handle<Rod>) {
         let mut world = World::new(Settings::default()).unwrap();
         let thread = RodSpec::straight(DVec3::ZERO, DVec3::X * self.length, self.elements, self.radius, t1().0);
-        let a = world.insert_rod(&RodSpec { rest: self.rest.clone(), section: self.section, along: self.along.clone(), ..thread }).unwrap();
+        let a = world
+            .insert_rod(&RodSpec {
+                rest: self.rest.clone(),
+                section: self.section,
+                along: self.along.clone(),
+                ..thread
+            })
+            .unwrap();
         let ring = RodSpec::ring(DVec3::Y * 0.05, DVec3::Z, DVec3::X * 0.02, 24, 0.16e-3, t1().0);
-        let points = ring.centerline.iter().copied().chain((!self.closed).then(|| ring.centerline[0] + DVec3::Z * 1e-3)).collect();
-        let ring = world.insert_rod(&RodSpec { centerline: points, closure: self.closed.then(Default::default), ..ring }).unwrap();
+        let points = ring
+            .centerline
+            .iter()
+            .copied()
+            .chain((!self.closed).then(|| ring.centerline[0] + DVec3::Z * 1e-3))
+            .collect();
+        let ring = world
+            .insert_rod(&RodSpec { centerline: points, closure: self.closed.then(Default::default), ..ring })
+            .unwrap();
         world.insert_shape(&ShapeSpec::fixed(self.geometry.clone(), Pose::at(DVec3::Z * -0.2))).unwrap();
         let from = world.rod(ring).unwrap().positions()[12];
         let other = world.insert_rod(&RodSpec::straight(from, from + DVec3::Z * 0.02, 10, 0.16e-3, t1().0)).unwrap();
@@ -147,7 +174,10 @@ fn a_snapshot_of_a_world_that_is_built_otherwise_is_refused_and_says_what_differ
     let snapshot = world.snapshot();
     let bent = RestShape::Given { lengths: None, darboux: Some(vec![DVec3::X; 19]) };
     let thinner = Along { size: Profile(vec![(0.0, 1.0), (0.05, 0.5)]), ..Along::default() };
-    let sheet = |z: f64| Geometry::Mesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, z)], triangles: vec![[0, 1, 2]] };
+    let sheet = |z: f64| Geometry::Mesh {
+        vertices: vec![DVec3::ZERO, DVec3::X, DVec3::new(0.0, 1.0, z)],
+        triangles: vec![[0, 1, 2]],
+    };
     for (other, words) in [
         (Parts { length: 0.1, ..parts.clone() }, &["thread 0", "element 0", "0.0025", "0.005"][..]),
         (Parts { elements: 25, ..parts.clone() }, &["thread 0", "20 elements there, 25 here"]),
@@ -156,7 +186,10 @@ fn a_snapshot_of_a_world_that_is_built_otherwise_is_refused_and_says_what_differ
         (Parts { section: Section::Ellipse([1e-4, 2e-4]), ..parts.clone() }, &["thread 0", "cross-section"]),
         (Parts { along: thinner, ..parts.clone() }, &["thread 0", "along"]),
         (Parts { closed: false, ..parts.clone() }, &["thread 1", "closed there, open here"]),
-        (Parts { geometry: Geometry::Box { half_sides: DVec3::splat(0.06) }, ..parts.clone() }, &["shape 0", "geometry"]),
+        (
+            Parts { geometry: Geometry::Box { half_sides: DVec3::splat(0.06) }, ..parts.clone() },
+            &["shape 0", "geometry"],
+        ),
         (Parts { geometry: Geometry::Sphere { radius: 0.011 }, ..parts.clone() }, &["shape 0", "geometry"]),
         (Parts { geometry: sheet(0.1), ..parts.clone() }, &["shape 0", "geometry"]),
         (Parts { weld: Place::Particle(11), ..parts.clone() }, &["welds"]),
@@ -183,9 +216,11 @@ fn a_snapshot_of_a_world_that_is_built_otherwise_is_refused_and_says_what_differ
         before.restore(&snapshot).unwrap();
         assert_eq!(before.state_hash(), fed.state_hash());
     }
-    let error = restore_damaged(&mut Parts { length: 0.06, ..reeled.clone() }.world(), &snapshot).unwrap_err().to_string();
+    let error =
+        restore_damaged(&mut Parts { length: 0.06, ..reeled.clone() }.world(), &snapshot).unwrap_err().to_string();
     assert!(error.contains("thread 0") && error.contains("at the end"), "{error}");
-    let error = restore_damaged(&mut Parts { length: 0.06, ..parts.clone() }.world(), &snapshot).unwrap_err().to_string();
+    let error =
+        restore_damaged(&mut Parts { length: 0.06, ..parts.clone() }.world(), &snapshot).unwrap_err().to_string();
     assert!(error.contains("thread 0") && error.contains("at the end"), "{error}");
     assert!(restore_damaged(&mut Parts { radius: 0.2e-3, ..reeled }.world(), &snapshot).is_err());
 }
@@ -194,7 +229,8 @@ fn a_snapshot_of_a_world_that_is_built_otherwise_is_refused_and_says_what_differ
 fn a_snapshot_with_nan_in_place_of_a_number() {
     let mut world = full_world();
     let bytes = world.snapshot();
-    // Eight bytes that make a number as they occur here are one, mostly; the others lie across two, and may make one that will do.
+    // Eight bytes that make a number as they occur here are one, mostly; the others lie across two, and may make one
+    // that will do.
     let number = |at: usize| f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap()).abs();
     let numbers: Vec<usize> = (8..bytes.len() - 8).filter(|at| (1e-9..1e3).contains(&number(*at))).collect();
     assert!(numbers.len() > 200, "{}", numbers.len());

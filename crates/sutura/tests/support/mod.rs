@@ -14,7 +14,8 @@ pub fn quiet() -> Settings {
     Settings { gravity: DVec3::ZERO, substep: 1.0 / 60.0, friction: Friction::coulomb(0.3), ..Settings::default() }
 }
 
-/// Steps until nothing moves faster than `speed` \[m/s\] for ten steps, at most `limit` seconds. Returns the time it took.
+/// Steps until nothing moves faster than `speed` \[m/s\] for ten steps, at most `limit` seconds. Returns the time it
+/// took.
 pub fn settle(world: &mut World, dt: f64, speed: f64, limit: f64) -> f64 {
     let start = world.time();
     let mut still = 0;
@@ -30,8 +31,9 @@ pub fn settle(world: &mut World, dt: f64, speed: f64, limit: f64) -> f64 {
     panic!("not at rest after {limit} s");
 }
 
-/// A loose open overhand knot (left or right does not matter) through `n + 1` points at equal arcs: Shastri's polynomial trefoil
-/// `(t^3 - 3 t, t^4 - 4 t^2, 0.55 (t^5 / 5 - 2 t))` takes 45 % of the length, straight tails the rest.
+/// A loose open overhand knot (left or right does not matter) through `n + 1` points at equal arcs: Shastri's
+/// polynomial trefoil `(t^3 - 3 t, t^4 - 4 t^2, 0.55 (t^5 / 5 - 2 t))` takes 45 % of the length, straight tails the
+/// rest.
 pub fn overhand(length: f64, n: usize) -> Vec<DVec3> {
     let knot: Vec<DVec3> = (0..=4000)
         .map(|i| {
@@ -50,8 +52,9 @@ pub fn overhand(length: f64, n: usize) -> Vec<DVec3> {
     resample(&points, n)
 }
 
-/// `n + 1` points at equal arcs along a polyline. The studies have the same (`evenly` and `overhand` in `crates/studies/src/curve.rs`): what
-/// both see is the engine, which inserts centerlines and makes none, and its tests do not build the studies' tables and pictures.
+/// `n + 1` points at equal arcs along a polyline. The studies have the same (`evenly` and `overhand` in
+/// `crates/studies/src/curve.rs`): what both see is the engine, which inserts centerlines and makes none, and its tests
+/// do not build the studies' tables and pictures.
 pub fn resample(points: &[DVec3], n: usize) -> Vec<DVec3> {
     let mut arc = vec![0.0];
     for w in points.windows(2) {

@@ -51,7 +51,20 @@ fn tube(rings: usize, around: usize, length: f64) -> Mesh {
 fn cube(at: DVec3, half: f64) -> Mesh {
     let sign = |b: u32| if b == 0 { -half } else { half };
     let vertices = (0..8).map(|k| at + DVec3::new(sign(k & 1), sign(k >> 1 & 1), sign(k >> 2))).collect();
-    let triangles = vec![[0, 3, 1], [0, 2, 3], [4, 7, 6], [4, 5, 7], [0, 5, 4], [0, 1, 5], [2, 7, 3], [2, 6, 7], [0, 6, 2], [0, 4, 6], [1, 7, 5], [1, 3, 7]];
+    let triangles = vec![
+        [0, 3, 1],
+        [0, 2, 3],
+        [4, 7, 6],
+        [4, 5, 7],
+        [0, 5, 4],
+        [0, 1, 5],
+        [2, 7, 3],
+        [2, 6, 7],
+        [0, 6, 2],
+        [0, 4, 6],
+        [1, 7, 5],
+        [1, 3, 7],
+    ];
     (vertices, triangles)
 }
 
@@ -256,7 +269,8 @@ proptest! {
 #[test]
 fn sheets_are_open_and_said_to_be() {
     let triangle: Mesh = (vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]);
-    let roof: Mesh = (vec![DVec3::Z, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y], vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]);
+    let roof: Mesh =
+        (vec![DVec3::Z, DVec3::X, DVec3::Y, -DVec3::X, -DVec3::Y], vec![[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]);
     for m in [triangle, roof, tube(4, 12, 10.0)] {
         let c = passed(&m);
         assert!(!c.closed && c.notes.len() == 1 && c.notes[0].contains("open"), "{:?}", c.notes);
@@ -300,7 +314,8 @@ fn a_moebius_strip_is_refused() {
     let n = n as usize;
     let vertices: Vec<DVec3> = (0..n).flat_map(|k| [edge(k, -1.0), edge(k, 1.0)]).collect();
     let at = |k: usize, side: usize| if k < n { (2 * k + side) as u32 } else { 1 - side as u32 };
-    let triangles = (0..n).flat_map(|k| [[at(k, 0), at(k + 1, 0), at(k + 1, 1)], [at(k, 0), at(k + 1, 1), at(k, 1)]]).collect();
+    let triangles =
+        (0..n).flat_map(|k| [[at(k, 0), at(k + 1, 0), at(k + 1, 1)], [at(k, 0), at(k + 1, 1), at(k, 1)]]).collect();
     let (field, value) = refused(&(vertices, triangles));
     assert!(field.starts_with("triangles[") && value.contains("one side"), "{value}");
 }

@@ -20,9 +20,9 @@ use crate::model::Model;
 use crate::model::grip::{Drive, LoadKind};
 use crate::model::rod::{RodModel, Stretch};
 use crate::model::shape::ShapeMotion;
-use crate::newton::LENGTH_TOLERANCE;
+use crate::motion::Motion;
 use crate::params::{Integrator, OVERLAP};
-use crate::scratch::Scratch;
+use crate::rod::length::LENGTH_TOLERANCE;
 use crate::state::State;
 use glam::{DMat3, DVec3};
 
@@ -114,13 +114,11 @@ pub(crate) enum Settled {
 pub(crate) fn settle(
     model: &Model,
     state: &mut State,
-    scratch: &mut Scratch,
+    motion: &Motion,
+    budget: &mut Budget,
     before: &State,
-    h: f64,
-    method: Method,
-    last: bool,
+    (h, method, last): (f64, Method, bool),
 ) -> Settled {
-    let mut budget = core::mem::take(&mut scratch.budget);
     budget.group(model, state, before);
     let mut settled = Settled::Well;
     for root in 0..budget.of.len() as u32 {
@@ -137,13 +135,13 @@ pub(crate) fn settle(
                 .filter_map(|(slot, _)| model.rods.at(slot as u32))
         };
         if !group.held {
-            keep_momentum(model, state, scratch, before, h, method, &rods);
+            keep_momentum(model, state, motion, before, h, method, &rods);
         }
         // Implicit Euler is left alone where hands hold what touches something: contacts give back what they were
         // pressed with.
         let kept = !(group.gripped && model.settings.integrator == Integrator::ImplicitEuler);
         if !group.twisted && kept {
-            match keep_energy(model, state, scratch, before, group.held, last, &rods) {
+            match keep_energy(model, state, motion, before, group.held, last, &rods) {
                 Settled::Well => {}
                 _ if method != Method::Euler => settled = Settled::Coarse,
                 // A length that was off at the start, by an edit, is work that was put in.
@@ -152,7 +150,6 @@ pub(crate) fn settle(
             }
         }
     }
-    scratch.budget = budget;
     settled
 }
 
@@ -222,7 +219,7 @@ impl Budget {
 fn keep_momentum<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     model: &Model,
     state: &mut State,
-    scratch: &Scratch,
+    motion: &Motion,
     before: &State,
     h: f64,
     method: Method,
@@ -235,9 +232,9 @@ fn keep_momentum<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     for rod in rods() {
         for i in rod.particles() {
             let arms = before.position[i] - was.rigid.center + state.position[i] - is.rigid.center;
-            torque += (arms * 0.5).cross(scratch.force[i]);
+            torque += (arms * 0.5).cross(motion.force[i]);
         }
-        torque += rod.elements().map(|e| scratch.torque[e]).sum::<DVec3>();
+        torque += rod.elements().map(|e| motion.torque[e]).sum::<DVec3>();
     }
     // As the solves have it, which leave the gyroscopic moment out: inertia times the change of angular velocity.
     let mut spin = DVec3::ZERO;
@@ -264,7 +261,7 @@ fn keep_momentum<'a, I: Iterator<Item = &'a RodModel> + Clone>(
 fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     model: &Model,
     state: &mut State,
-    scratch: &Scratch,
+    motion: &Motion,
     before: &State,
     held: bool,
     last: bool,
@@ -274,7 +271,7 @@ fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     let (mut gain, mut scale) = (0.0, 0.0);
     for rod in rods() {
         let [was, is] = [before, &*state].map(|s| {
-            let e = crate::rod::energy(model, s, rod);
+            let e = crate::rod::energy::energy(model, s, rod);
             e.kinetic + e.stretch + e.bend + e.twist
         });
         let give: f64 =
@@ -283,7 +280,7 @@ fn keep_energy<'a, I: Iterator<Item = &'a RodModel> + Clone>(
         gain += is - was;
         for i in rod.particles() {
             // Not the difference of two potentials: the origin may be far.
-            let work = scratch.force[i].dot(state.position[i] - before.position[i]);
+            let work = motion.force[i].dot(state.position[i] - before.position[i]);
             scale += work.abs();
             gain -= work;
         }

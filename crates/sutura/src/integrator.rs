@@ -15,12 +15,16 @@
 
 use crate::math::{exp, log};
 use crate::model::Model;
+use crate::motion::Motion;
 use crate::params::Integrator;
 use crate::rod::strain;
-use crate::scratch::Scratch;
 use crate::state::{Onset, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+use core::ops::Range;
 use glam::DVec3;
+
+/// Blocks of a rod, and the zone of its contacts.
+type Blocks = (Range<usize>, Range<usize>);
 
 /// How a substep is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,12 +105,20 @@ impl Stage {
 /// Sets up `target` and `target_frame`, and moves the state to the first iterate: for implicit Euler where its velocity
 /// carries it (loads left out: a light end under load would start far away), else on with the accelerations that are
 /// known. `origin` is the state at the start of the substep.
-pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, origin: &State, stage: &Stage, h: f64) {
+pub(crate) fn carry(
+    model: &Model,
+    state: &mut State,
+    motion: &mut Motion,
+    rods: &[Blocks],
+    origin: &State,
+    stage: &Stage,
+    h: f64,
+) {
     let Some([w0, w1]) = stage.weights else {
-        carry_euler(model, state, scratch, h);
+        carry_euler(model, state, motion, rods, h);
         return;
     };
-    scratch.heavier = [1.0; 2];
+    motion.heavier = [1.0; 2];
     let (keep, keep_spin) = half_damping(model, h);
     let at_start = stage.begin == 0.0;
     let span = stage.span;
@@ -118,13 +130,13 @@ pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, ori
     };
     let rate = |k: f64, w: f64, v: DVec3| if w == 0.0 { DVec3::ZERO } else { v * (k * w) };
     let of = |known: &[DVec3], i: usize, w: f64| if w == 0.0 { DVec3::ZERO } else { known[i] * w };
-    for (rod, _) in &scratch.rods {
+    for (rod, _) in rods {
         for i in rod.clone() {
             let base = origin.position[i] + rate(keep, w0, origin.velocity[i]) + rate(1.0, w1, state.velocity[i]);
             let carried = origin.velocity[i] * keep + of(&origin.acceleration, i, w0) + of(&state.acceleration, i, w1);
-            scratch.carried[i] = carried;
-            scratch.target[i] = base + carried * span;
-            state.position[i] = scratch.target[i] + ahead(&origin.acceleration, &state.acceleration, i) * (span * span);
+            motion.carried[i] = carried;
+            motion.target[i] = base + carried * span;
+            state.position[i] = motion.target[i] + ahead(&origin.acceleration, &state.acceleration, i) * (span * span);
         }
         for e in rod.start..rod.end - 1 {
             // Angle over which damping takes its rate.
@@ -141,7 +153,7 @@ pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, ori
                         ) * (w * k)
                     }
                 };
-                scratch.start_angle[e] = strain::joint_angle(origin.orientation[e - 1], origin.orientation[e], half)
+                motion.start_angle[e] = strain::joint_angle(origin.orientation[e - 1], origin.orientation[e], half)
                     + rate(origin, w0, keep_spin)
                     + rate(state, w1, 1.0);
             }
@@ -152,28 +164,28 @@ pub(crate) fn carry(model: &Model, state: &mut State, scratch: &mut Scratch, ori
             let carried = origin.angular_velocity[e] * keep_spin
                 + of(&origin.angular_acceleration, e, w0)
                 + of(&state.angular_acceleration, e, w1);
-            scratch.carried_spin[e] = carried;
-            scratch.target_frame[e] = (exp(carried * span) * base).normalize();
+            motion.carried_spin[e] = carried;
+            motion.target_frame[e] = (exp(carried * span) * base).normalize();
             let on = ahead(&origin.angular_acceleration, &state.angular_acceleration, e) * (span * span);
-            state.orientation[e] = (exp(on) * scratch.target_frame[e]).normalize();
+            state.orientation[e] = (exp(on) * motion.target_frame[e]).normalize();
         }
     }
 }
 
 /// Drag is in the solve: x~ = x + h exp(-c h) v and inertia over h (1 - exp(-c h)) / c.
-fn carry_euler(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
+fn carry_euler(model: &Model, state: &mut State, motion: &mut Motion, rods: &[Blocks], h: f64) {
     let (keep, keep_spin) = drag(model, h);
     let settings = &model.settings;
-    scratch.heavier = [settings.linear_drag, settings.angular_drag].map(|c| heavier(c * h));
-    for (rod, _) in &scratch.rods {
+    motion.heavier = [settings.linear_drag, settings.angular_drag].map(|c| heavier(c * h));
+    for (rod, _) in rods {
         for i in rod.clone() {
             state.position[i] += state.velocity[i] * (h * keep);
-            scratch.target[i] = state.position[i];
+            motion.target[i] = state.position[i];
         }
         for e in rod.start..rod.end - 1 {
             // Only damping asks for it.
             if e > rod.start && model.bend_damping[e] != 0.0 {
-                scratch.start_angle[e] =
+                motion.start_angle[e] =
                     strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
             }
         }
@@ -181,7 +193,7 @@ fn carry_euler(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) 
             let q = state.orientation[e];
             let turned = exp(state.angular_velocity[e] * (h * keep_spin));
             state.orientation[e] = (turned * q).normalize();
-            scratch.target_frame[e] = state.orientation[e];
+            motion.target_frame[e] = state.orientation[e];
         }
     }
 }
@@ -219,42 +231,42 @@ fn heavier(x: f64) -> f64 {
 }
 
 /// Velocities from the motion, with damping, and the accelerations that go with them where the next substep may ask.
-pub(crate) fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, stage: &Stage, h: f64) {
+pub(crate) fn leave_rates(model: &Model, state: &mut State, motion: &Motion, rods: &[Blocks], stage: &Stage, h: f64) {
     if model.settings.integrator == Integrator::TrBdf2 {
         let over = 1.0 / (stage.span * stage.span);
         state.acceleration.resize(model.mass.len(), DVec3::ZERO);
         state.angular_acceleration.resize(model.mass.len(), DVec3::ZERO);
-        for (rod, _) in &scratch.rods {
+        for (rod, _) in rods {
             for i in rod.clone() {
-                state.acceleration[i] = (state.position[i] - scratch.target[i]) * (over * scratch.heavier[0]);
+                state.acceleration[i] = (state.position[i] - motion.target[i]) * (over * motion.heavier[0]);
             }
             for e in rod.start..rod.end - 1 {
                 state.angular_acceleration[e] =
-                    log(state.orientation[e] * scratch.target_frame[e].conjugate()) * (over * scratch.heavier[1]);
+                    log(state.orientation[e] * motion.target_frame[e].conjugate()) * (over * motion.heavier[1]);
             }
         }
     }
     if stage.weights.is_some() {
         let (keep, keep_spin) = if stage.last { half_damping(model, h) } else { (1.0, 1.0) };
-        for (rod, _) in &scratch.rods {
+        for (rod, _) in rods {
             for i in rod.clone() {
-                state.velocity[i] = (scratch.carried[i] + state.acceleration[i] * stage.span) * keep;
+                state.velocity[i] = (motion.carried[i] + state.acceleration[i] * stage.span) * keep;
             }
             for e in rod.start..rod.end - 1 {
                 state.angular_velocity[e] =
-                    (scratch.carried_spin[e] + state.angular_acceleration[e] * stage.span) * keep_spin;
+                    (motion.carried_spin[e] + state.angular_acceleration[e] * stage.span) * keep_spin;
             }
         }
         return;
     }
     let (keep_linear, keep_angular) = fade(model, h);
-    for (rod, _) in &scratch.rods {
+    for (rod, _) in rods {
         for i in rod.clone() {
-            state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
+            state.velocity[i] = (state.position[i] - motion.start[i]) * (keep_linear / h);
         }
         for e in rod.start..rod.end - 1 {
             state.angular_velocity[e] =
-                log(state.orientation[e] * scratch.start_frame[e].conjugate()) * (keep_angular / h);
+                log(state.orientation[e] * motion.start_frame[e].conjugate()) * (keep_angular / h);
         }
     }
 }

@@ -2,15 +2,16 @@
 
 use crate::model::Model;
 use crate::newton;
+use crate::newton::Solver;
 use crate::rod::assemble::{Hessian, assemble};
-use crate::scratch::Scratch;
+use crate::rod::scratch::RodScratch;
 use crate::state::State;
 
 /// The rods of a world at rest in their present state.
 pub struct Kernels {
     model: Model,
     state: State,
-    scratch: Scratch,
+    solver: Solver,
 }
 
 /// Substep of the default settings \[s\].
@@ -20,26 +21,29 @@ impl Kernels {
     /// Takes the world apart.
     pub fn new(world: crate::World) -> Self {
         let (model, state) = world.into_parts();
-        let mut scratch = Scratch::default();
-        scratch.fit(&model);
-        scratch.target.copy_from_slice(&state.position);
-        scratch.target_frame.copy_from_slice(&state.orientation);
-        crate::row::couple::zones(&mut scratch);
-        Kernels { model, state, scratch }
+        let mut solver = Solver::default();
+        solver.motion.fit(&model);
+        solver.rods.fit(&model);
+        solver.motion.target.copy_from_slice(&state.position);
+        solver.motion.target_frame.copy_from_slice(&state.orientation);
+        crate::row::couple::zones(&mut solver.rods.ranges, &solver.rows);
+        Kernels { model, state, solver }
     }
     /// Residual and Hessian.
     pub fn assemble(&mut self) {
-        assemble(&self.model, &self.state, &mut self.scratch, H, Hessian::Exact);
+        let Solver { motion, rods, .. } = &mut self.solver;
+        assemble(&self.model, &self.state, motion, rods, H, Hessian::Exact);
     }
     /// Those and the factor. False when it is not positive.
     pub fn factor(&mut self) -> bool {
-        newton::factor(&self.model, &self.state, &mut self.scratch, H, Hessian::Positive, false)
+        let Solver { motion, rods, rows, .. } = &mut self.solver;
+        newton::factor(&self.model, &self.state, motion, rods, rows, (H, Hessian::Positive, false))
     }
     /// One right side.
     pub fn solve(&mut self) -> f64 {
-        let Scratch { system, rods, rhs, step, .. } = &mut self.scratch;
+        let RodScratch { system, ranges, rhs, step, .. } = &mut self.solver.rods;
         step.copy_from_slice(rhs);
-        for (rod, zone) in rods.iter() {
+        for (rod, zone) in ranges.iter() {
             system.solve(rod.clone(), zone, step);
         }
         step[0].x

@@ -227,6 +227,12 @@ pub(crate) fn solve_dense(a: &mut [f64], b: &mut [f64], n: usize) -> bool {
     true
 }
 
+/// Maximum that keeps NaN.
+#[inline]
+pub(crate) fn max_or_nan(a: f64, b: f64) -> f64 {
+    if b <= a || a.is_nan() { a } else { b }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

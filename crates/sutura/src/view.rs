@@ -8,6 +8,7 @@ use crate::model::rod::{RodModel, Stretch};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
+use crate::rod::energy::{Energy, energy};
 use crate::state::State;
 use glam::{DQuat, DVec3};
 
@@ -89,28 +90,6 @@ pub enum ContactWith {
     Thread(usize, usize, f64),
     /// Shape slot.
     Shape(usize),
-}
-
-/// Mechanical energy \[J\]. Elastic parts are zero at rest; gravity is relative to the world's origin.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Energy {
-    /// Of motion and spin.
-    pub kinetic: f64,
-    /// Of stretch and shear.
-    pub stretch: f64,
-    /// Of bending.
-    pub bend: f64,
-    /// Of twist.
-    pub twist: f64,
-    /// In the gravity field.
-    pub gravity: f64,
-}
-
-impl Energy {
-    /// The sum.
-    pub fn total(&self) -> f64 {
-        self.kinetic + self.stretch + self.bend + self.twist + self.gravity
-    }
 }
 
 impl<'a> View<'a> {
@@ -327,7 +306,7 @@ impl<'a> RodView<'a> {
     }
     /// Mechanical energy of this thread.
     pub fn energy(&self) -> Energy {
-        crate::rod::energy(self.model, self.state, self.rod)
+        energy(self.model, self.state, self.rod)
     }
     /// Linear momentum \[kg m/s\].
     pub fn momentum(&self) -> DVec3 {

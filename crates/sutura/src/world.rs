@@ -1,6 +1,7 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
 use crate::collide::overlap::{Overlap, OverlapWith};
+use crate::drive::Interval;
 use crate::error::{Error, check};
 use crate::handle::Handle;
 use crate::math::Pose;
@@ -17,6 +18,7 @@ use crate::row;
 use crate::scratch::Scratch;
 use crate::snapshot::{Build, Snapshot};
 use crate::state::{GripState, LoadState, Onset, ReelState, State};
+use crate::step::Step;
 use crate::view::{ContactView, ContactWith, RodView, ShapeView, View};
 use glam::{DQuat, DVec3};
 
@@ -250,7 +252,7 @@ impl World {
         change(&mut self.model);
         self.model.refresh_masses(&self.state.loads);
         self.follow_strain(elements.clone());
-        if !crate::rod::in_proportion(&self.model, &self.state) {
+        if !crate::finite::in_proportion(&self.model, &self.state) {
             back(&mut self.model);
             self.model.refresh_masses(&self.state.loads);
             self.state.tension[elements].copy_from_slice(&tension);
@@ -485,7 +487,7 @@ impl World {
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
         let Checked { geometry, closed, container, notes } = spec.check()?;
-        let collider = crate::collide::Collider::new(&geometry)?;
+        let collider = crate::model::collider::Collider::new(&geometry)?;
         let hash = crate::snapshot::hash_of(&geometry);
         let shape = ShapeModel {
             geometry,
@@ -581,7 +583,7 @@ impl World {
                 let welded = self.model.weld_of[i].map(|w| state.weld_orientation[w as usize]);
                 let (before, after) =
                     ((index > 0).then(|| state.orientation[i - 1]), (index < n).then(|| state.orientation[i]));
-                let q = welded.unwrap_or_else(|| crate::step::clamp_orientation(before, after, rest_half));
+                let q = welded.unwrap_or_else(|| crate::model::grip::clamp_orientation(before, after, rest_half));
                 (state.position[i], q, state.velocity[i], state.angular_velocity[if index < n { i } else { i - 1 }])
             }
             Hold::Jaw => {
@@ -886,8 +888,12 @@ impl World {
         let placed = core::mem::take(&mut self.model.placed);
         self.report_overlaps(&placed, &mut report);
         let teleported = self.report_teleports(dt, &mut report);
-        let mut interval = crate::step::Interval { start, length: dt, observe };
-        crate::step::step(&mut self.model, &mut self.state, &mut self.scratch, &mut interval, &mut report);
+        let interval = &mut Interval { start, length: dt, observe };
+        let World { model, state, scratch, .. } = self;
+        match model.settings.solver {
+            Solver::Direct => Step { model, state, scratch, interval, report: &mut report }.run(),
+            Solver::Paper(p) => crate::pbd::step(model, state, &mut scratch.paper, interval, &p, &mut report),
+        }
         report.time = self.state.time;
         self.work += report.work;
         self.report_overlaps(&teleported, &mut report);
@@ -988,7 +994,7 @@ impl World {
         }
         // Finite numbers may be so large that what is worked out from them, with the masses that they attach, is not.
         let sound = fits.and_then(|()| {
-            crate::rod::in_proportion(&self.model, &self.state)
+            crate::finite::in_proportion(&self.model, &self.state)
                 .then_some(())
                 .ok_or("a number in it is out of all proportion")
         });

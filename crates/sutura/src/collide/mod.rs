@@ -2,19 +2,17 @@
 //! `row`.
 
 pub(crate) mod overlap;
-pub(crate) mod segment;
-mod shape;
 mod tree;
 
-pub(crate) use shape::{APART, Collider, Distance};
-
+use crate::lanes::Vec2;
 use crate::model::Model;
+use crate::model::collider::{Collider, Distance};
 use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
+use crate::motion::Motion;
 use crate::params;
 use crate::report::Rejection;
-use crate::rod::lanes::Vec2;
-use crate::scratch::Scratch;
+use crate::segment;
 use crate::state::State;
 use core::ops::Range;
 use glam::DVec3;
@@ -31,6 +29,8 @@ pub(crate) struct Candidates {
     /// Boxes of the living shapes, all the way from the start of the substep to the iterate, in the order of their
     /// slots.
     shape_bounds: Vec<(DVec3, DVec3)>,
+    /// Radius of the thread of each element \[m\].
+    pub radius: Vec<f64>,
     /// Rest arc of each particle from the start of its rod \[m\].
     pub arc: Vec<f64>,
     tree: Tree,
@@ -38,6 +38,14 @@ pub(crate) struct Candidates {
     turned: Vec<[f64; 2]>,
     /// The last element up to which a thread is nearly straight from each element on, at the start and at the iterate.
     straight: Vec<usize>,
+}
+
+impl Candidates {
+    /// Takes up the radii of the model's threads.
+    pub fn fit(&mut self, model: &Model) {
+        self.radius.clear();
+        self.radius.extend(model.rod_of.iter().map(|r| model.rods.at(*r).map_or(0.0, |r| r.radius)));
+    }
 }
 
 /// Least clearances of an accepted state, in thread diameters.
@@ -134,9 +142,9 @@ fn arcs(model: &Model, arc: &mut Vec<f64>) {
 
 /// Fills the candidates with all pairs that come within reach of each other between the start of the substep and the
 /// iterate, with room for what Newton will add.
-pub(crate) fn detect(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { candidates, start, start_shape_pose, radius, .. } = scratch;
-    let Candidates { threads, shapes, shape_bounds, arc, tree, turned, straight } = candidates;
+pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: &mut Candidates) {
+    let Motion { start, start_shape_pose, .. } = motion;
+    let Candidates { threads, shapes, shape_bounds, radius, arc, tree, turned, straight } = candidates;
     let n = model.mass.len();
     arcs(model, arc);
     turning(model, [start, &state.position], turned);
@@ -187,27 +195,29 @@ pub(crate) struct Refused {
     pub rods: [u32; 2],
 }
 
-/// What [`sweep`] asks of the rows.
-#[derive(Clone, Copy)]
-pub(crate) struct Pressed {
-    pub threads: fn(&Scratch, usize, usize) -> f64,
-    pub shape: fn(&Scratch, u32, usize) -> f64,
+/// Says how deep contact forces press pieces into each other \[m\].
+pub(crate) trait Pressed {
+    /// Two elements or their neighbors.
+    fn threads(&self, a: usize, b: usize) -> f64;
+    /// An element or its neighbors into a shape.
+    fn shape(&self, shape: u32, element: usize) -> f64;
 }
 
 /// Judges the motion from the start of the substep to the iterate: nothing may overlap by more than the tolerance and
-/// still approach, nothing may have passed through. `pressed` says how deep the forces near two elements, and near an
-/// element and a shape, press them into each other \[m\].
+/// still approach, nothing may have passed through.
 pub(crate) fn sweep(
     model: &Model,
     state: &State,
-    scratch: &mut Scratch,
-    pressed: Pressed,
+    motion: &Motion,
+    candidates: &mut Candidates,
+    pressed: &impl Pressed,
 ) -> Result<Clearance, Refused> {
-    if outran(model, state, scratch) {
-        detect(model, state, scratch);
+    if outran(model, state, candidates) {
+        detect(model, state, motion, candidates);
     }
     let mut clearance = Clearance::default();
-    let Scratch { candidates, start, start_shape_pose, radius, .. } = &*scratch;
+    let Motion { start, start_shape_pose, .. } = motion;
+    let radius = &candidates.radius;
     let x = &state.position;
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
@@ -226,8 +236,7 @@ pub(crate) fn sweep(
             continue;
         }
         let before = segment::closest(start[a], start[a + 1], start[b], start[b + 1]).apart.length();
-        if gap < -params::OVERLAP && params::overlaps((before - sum) / sum, gap, (pressed.threads)(scratch, a, b) / sum)
-        {
+        if gap < -params::OVERLAP && params::overlaps((before - sum) / sum, gap, pressed.threads(a, b) / sum) {
             return Err(Refused { reason: Rejection::ThreadOverlap, rods: [model.rod_of[a], model.rod_of[b]] });
         }
         if before - moved < params::PASS * sum && passes(start, x, a, b, params::PASS * sum.min(before)) {
@@ -256,7 +265,7 @@ pub(crate) fn sweep(
                 return Ok(());
             }
             let before = collider.distance_local(from[0].lerp(from[1], s)).value;
-            let pressed = (pressed.shape)(scratch, *slot, e) / (2.0 * r);
+            let pressed = pressed.shape(*slot, e) / (2.0 * r);
             if params::overlaps((before - r) / (2.0 * r), gap, pressed) {
                 Err(refused(Rejection::ShapeOverlap))
             } else {
@@ -291,8 +300,8 @@ pub(crate) fn sweep(
 
 /// Whether the iterate, or a shape that is pushed, left the boxes in which candidates were sought, or bent a piece that
 /// was taken as straight.
-fn outran(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
-    let Scratch { candidates, radius, .. } = scratch;
+fn outran(model: &Model, state: &State, candidates: &mut Candidates) -> bool {
+    let radius = &candidates.radius;
     let x = &state.position;
     let left = (0..model.mass.len()).filter(|e| model.is_element(*e)).any(|e| {
         let b = candidates.tree.leaf(e);
@@ -379,36 +388,48 @@ mod tests {
     use super::*;
     use crate::{Material, RodSpec, World};
 
+    struct Unpressed;
+
+    impl Pressed for Unpressed {
+        fn threads(&self, _: usize, _: usize) -> f64 {
+            0.0
+        }
+        fn shape(&self, _: u32, _: usize) -> f64 {
+            0.0
+        }
+    }
+
     /// A straight thread of 100 elements of one radius each, at the start of a substep in which nothing moves.
-    fn straight_thread() -> (Model, State, Scratch, f64) {
+    fn straight_thread() -> (Model, State, Motion, Candidates, f64) {
         let r = 1e-4;
         let mut world = World::default();
         world
             .insert_rod(&RodSpec::straight(DVec3::ZERO, DVec3::X * (100.0 * r), 100, r, Material::elastic(1e9, 1000.0)))
             .unwrap();
         let (model, state) = world.into_parts();
-        let mut scratch = Scratch::default();
-        scratch.fit(&model);
-        scratch.start.copy_from_slice(&state.position);
-        (model, state, scratch, r)
+        let (mut motion, mut candidates) = (Motion::default(), Candidates::default());
+        motion.fit(&model);
+        candidates.fit(&model);
+        motion.start.copy_from_slice(&state.position);
+        (model, state, motion, candidates, r)
     }
 
     #[test]
     fn a_straight_thread_has_no_candidates_and_a_fold_of_it_is_found_after_all() {
-        let (model, mut state, mut scratch, r) = straight_thread();
-        detect(&model, &state, &mut scratch);
-        assert!(scratch.candidates.threads.is_empty());
-        assert!(sweep(&model, &state, &mut scratch, Pressed { threads: |_, _, _| 0.0, shape: |_, _, _| 0.0 }).is_ok());
+        let (model, mut state, motion, mut candidates, r) = straight_thread();
+        detect(&model, &state, &motion, &mut candidates);
+        assert!(candidates.threads.is_empty());
+        assert!(sweep(&model, &state, &motion, &mut candidates, &Unpressed).is_ok());
         // The second half back along the first, one radius beside it.
         for i in 51..=100 {
             state.position[i] = state.position[100 - i] + DVec3::Y * r;
         }
-        assert!(sweep(&model, &state, &mut scratch, Pressed { threads: |_, _, _| 0.0, shape: |_, _, _| 0.0 }).is_err());
+        assert!(sweep(&model, &state, &motion, &mut candidates, &Unpressed).is_err());
     }
 
     #[test]
     fn only_pieces_that_bend_are_searched() {
-        let (model, mut state, mut scratch, r) = straight_thread();
+        let (model, mut state, mut motion, mut candidates, r) = straight_thread();
         // A hairpin of radius 2 r in the middle.
         let turn = 7;
         for i in 50..=100 {
@@ -418,9 +439,9 @@ mod tests {
                 state.position[i] -= DVec3::X * (r * (i - 50 - turn as usize) as f64);
             }
         }
-        scratch.start.copy_from_slice(&state.position);
-        detect(&model, &state, &mut scratch);
-        let pairs = &scratch.candidates.threads;
+        motion.start.copy_from_slice(&state.position);
+        detect(&model, &state, &motion, &mut candidates);
+        let pairs = &candidates.threads;
         // The legs are 4 r apart, so each element of one is in reach of some of the other; no pair lies within one leg.
         assert!(pairs.iter().all(|(a, b)| *b >= 50 && *a < 57), "{pairs:?}");
         assert!((10..50).all(|a| pairs.iter().any(|(x, _)| *x == a)));

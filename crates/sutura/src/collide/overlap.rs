@@ -8,14 +8,16 @@
 //! than `PRESSED`.
 
 use super::tree::{Bounds, Tree};
-use super::{Collider, arcs, neighbors, segment, turning};
+use super::{arcs, neighbors, turning};
 use crate::handle::Handle;
 use crate::math::Pose;
+use crate::model::collider::Collider;
 use crate::model::mesh::solid_angle;
 use crate::model::rod::Rod;
 use crate::model::shape::{Geometry, Shape};
 use crate::model::{Model, ShapeModel};
 use crate::params;
+use crate::segment;
 use crate::state::State;
 use core::ops::Range;
 use glam::DVec3;

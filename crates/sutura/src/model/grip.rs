@@ -2,9 +2,10 @@
 
 use crate::error::{Error, check};
 use crate::handle::Handle;
+use crate::math::half;
 use crate::model::Model;
 use crate::model::rod::{Rod, RodModel};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// A grip. Marker of [`Handle`](crate::Handle).
 #[derive(Debug)]
@@ -226,5 +227,22 @@ impl Place {
             Place::Particle(i) => Err(Error::invalid(what, "place.particle", i, "at most the number of elements")),
             Place::Element(e) => Err(Error::invalid(what, "place.element", e, "under the number of elements")),
         }
+    }
+}
+
+/// A load in action.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LoadState {
+    pub rod: u32,
+    pub kind: LoadKind,
+}
+
+/// Orientation held by a clamp that carries the moment there now.
+pub(crate) fn clamp_orientation(before: Option<DQuat>, after: Option<DQuat>, rest_half: DQuat) -> DQuat {
+    match (before, after) {
+        (Some(a), Some(b)) => (a * half(a.conjugate() * b)).normalize(),
+        (None, Some(b)) => (b * (rest_half * rest_half).conjugate()).normalize(),
+        (Some(a), None) => (a * rest_half * rest_half).normalize(),
+        (None, None) => DQuat::IDENTITY,
     }
 }

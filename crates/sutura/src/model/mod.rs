@@ -1,5 +1,6 @@
 //! What does not change while the world steps: topology, rest shape, mass, compliance, geometry.
 
+pub(crate) mod collider;
 pub mod grip;
 pub mod material;
 pub mod mesh;
@@ -11,9 +12,8 @@ pub mod weld;
 
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
-use crate::state::LoadState;
 use glam::{DQuat, DVec3};
-use grip::LoadKind;
+use grip::{LoadKind, LoadState};
 use material::{Material, SectionStiffness};
 use rod::{RodModel, Stretch};
 use section::Factors;
@@ -82,7 +82,7 @@ pub(crate) struct ShapeModel {
     pub geometry: Geometry,
     /// Hash of the geometry, for snapshots.
     pub hash: u64,
-    pub collider: crate::collide::Collider,
+    pub collider: collider::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,
     /// Whether a mesh is closed, so that it has an inside; of the other shapes true.

@@ -5,8 +5,7 @@ use crate::handle::Handle;
 use crate::model::Model;
 use crate::model::grip::Place;
 use crate::model::rod::Rod;
-use crate::rod::strain::joint_angle;
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 
 /// A weld. Marker of [`Handle`].
 #[derive(Debug)]
@@ -100,15 +99,6 @@ impl Side {
     /// At rest where its frame is now.
     pub fn turned(weld: DQuat, frame: DQuat) -> Self {
         Side { section: (weld.conjugate() * frame).normalize(), rest_half: DQuat::IDENTITY }
-    }
-}
-
-impl Half {
-    /// Elastic angle \[rad\] for the orientations of the weld and of its frame.
-    pub fn angle(&self, weld: DQuat, frame: DQuat) -> DVec3 {
-        let section = weld * self.side.section;
-        let (a, b) = if self.first { (section, frame) } else { (frame, section) };
-        joint_angle(a, b, self.side.rest_half)
     }
 }
 

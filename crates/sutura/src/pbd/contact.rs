@@ -16,9 +16,9 @@
 //! Limits: between spheres farther apart than their diameter there are gaps; what comes near in the projections only is
 //! seen a step later; there are no forces.
 
-use crate::collide::Collider;
 use crate::math::Pose;
 use crate::model::Model;
+use crate::model::collider::Collider;
 use crate::state::State;
 use glam::DVec3;
 

@@ -9,15 +9,16 @@ mod ddc;
 mod number;
 mod sweep;
 
+use crate::drive::{Interval, grip_pose, move_shapes, outside_forces};
+use crate::finite::all_finite;
 use crate::math::Pose;
 use crate::model::Model;
 use crate::model::grip::{Drive, Hold};
 use crate::model::shape::ShapeMotion;
+use crate::motion;
 use crate::params::PaperSettings;
 use crate::report::{Incident, IncidentKind, StepReport};
-use crate::scratch::Scratch;
 use crate::state::{Onset, State};
-use crate::step::{self, Interval};
 use crate::view::View;
 use constraints::{BendTwist, StretchShear};
 use contact::{Contacts, Motion};
@@ -28,6 +29,11 @@ use sweep::Sweep;
 /// Working memory.
 #[derive(Default)]
 pub(crate) struct Work {
+    /// State at the start of the substep.
+    saved: State,
+    motion: motion::Motion,
+    /// Radius of the thread of each element \[m\].
+    radius: Vec<f64>,
     /// Zero where a grip holds.
     inverse_mass: Vec<f64>,
     inverse_inertia: Vec<f64>,
@@ -40,7 +46,7 @@ pub(crate) struct Work {
 pub(crate) fn step(
     model: &Model,
     state: &mut State,
-    scratch: &mut Scratch,
+    work: &mut Work,
     interval: &mut Interval<'_>,
     p: &PaperSettings,
     report: &mut StepReport,
@@ -50,17 +56,19 @@ pub(crate) fn step(
         state.time = interval.start + interval.length;
         return;
     }
-    scratch.fit(model);
-    step::outside_forces(model, state, scratch);
-    weigh(model, state, &mut scratch.paper, p);
+    work.motion.fit(model);
+    work.radius.clear();
+    work.radius.extend(model.rod_of.iter().map(|r| model.rods.at(*r).map_or(0.0, |r| r.radius)));
+    outside_forces(model, state, &mut work.motion);
+    weigh(model, state, work, p);
     let n = (interval.length / model.settings.substep * (1.0 - 1e-9)).ceil().max(1.0);
     let h = interval.length / n;
     report.converged = true;
     for k in 1..=n as u32 {
-        step::save(state, scratch, 0);
+        work.saved.copy_from(state);
         let t = interval.start + h * f64::from(k);
-        if !substep(model, state, scratch, interval, p, t, h) {
-            step::restore(state, scratch, 0);
+        if !substep(model, state, work, interval, p, t, h) {
+            state.copy_from(&work.saved);
             state.velocity.fill(DVec3::ZERO);
             state.angular_velocity.fill(DVec3::ZERO);
             report.incidents.push(Incident { time: state.time, kind: IncidentKind::NotFinite });
@@ -69,7 +77,7 @@ pub(crate) fn step(
         }
         state.time = t;
         report.substeps += 1;
-        report.contacts = scratch.paper.contacts.touching() as u32;
+        report.contacts = work.contacts.touching() as u32;
         (interval.observe)(View { model, state });
     }
     let reached = (state.time - interval.start) / interval.length;
@@ -145,50 +153,49 @@ fn weigh(model: &Model, state: &State, work: &mut Work, p: &PaperSettings) {
 fn substep(
     model: &Model,
     state: &mut State,
-    scratch: &mut Scratch,
+    work: &mut Work,
     interval: &Interval<'_>,
     p: &PaperSettings,
     t: f64,
     h: f64,
 ) -> bool {
-    predict(model, state, scratch, h);
+    predict(model, state, work, h);
     hold(model, state, interval, t);
-    step::move_shapes(model, state, interval, t, h);
+    move_shapes(model, state, interval, t, h);
     if !state.position.iter().all(|x| crate::math::is_place(*x)) {
         return false;
     }
-    let Scratch { start, radius, start_shape_pose, paper, .. } = scratch;
-    let motion = Motion {
-        from: start,
+    let way = Motion {
+        from: &work.motion.start,
         to: &state.position,
-        radius,
-        inverse_mass: &paper.inverse_mass,
-        shapes_from: start_shape_pose,
+        radius: &work.radius,
+        inverse_mass: &work.inverse_mass,
+        shapes_from: &work.motion.start_shape_pose,
     };
-    paper.contacts.detect(model, state, &motion);
+    work.contacts.detect(model, state, &way);
     for _ in 0..p.iterations {
-        project(model, state, paper, p);
+        project(model, state, work, p);
     }
-    leave_rates(model, state, scratch, h);
-    step::all_finite(model, state)
+    leave_rates(model, state, &work.motion, h);
+    all_finite(model, state)
 }
 
 /// Explicit Euler under outside forces and torques.
-fn predict(model: &Model, state: &mut State, scratch: &mut Scratch, h: f64) {
-    scratch.start.copy_from_slice(&state.position);
-    scratch.start_frame.copy_from_slice(&state.orientation);
-    scratch.start_shape_pose.clone_from(&state.shape_pose);
-    let (w, wq) = (&scratch.paper.inverse_mass, &scratch.paper.inverse_inertia);
+fn predict(model: &Model, state: &mut State, work: &mut Work, h: f64) {
+    let Work { motion, inverse_mass: w, inverse_inertia: wq, .. } = work;
+    motion.start.copy_from_slice(&state.position);
+    motion.start_frame.copy_from_slice(&state.orientation);
+    motion.start_shape_pose.clone_from(&state.shape_pose);
     for (_, rod) in model.rods.iter() {
         for i in rod.particles() {
             if w[i] > 0.0 {
-                state.velocity[i] += scratch.force[i] * (h * w[i]);
+                state.velocity[i] += motion.force[i] * (h * w[i]);
                 state.position[i] += state.velocity[i] * h;
             }
         }
         for e in rod.elements() {
             if wq[e] > 0.0 {
-                state.angular_velocity[e] += scratch.torque[e] * (h * wq[e]);
+                state.angular_velocity[e] += motion.torque[e] * (h * wq[e]);
                 let q = state.orientation[e];
                 let spin = state.angular_velocity[e] * (0.5 * h);
                 state.orientation[e] = (q + DQuat::from_xyzw(spin.x, spin.y, spin.z, 0.0) * q).normalize();
@@ -203,7 +210,7 @@ fn hold(model: &Model, state: &mut State, interval: &Interval<'_>, t: f64) {
     for (_, grip) in state.grips.iter() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
         let i = (rod.first + grip.index) as usize;
-        let pose: Pose = step::grip_pose(grip, interval, t);
+        let pose: Pose = grip_pose(grip, interval, t);
         match grip.hold {
             Hold::Pin => position[i] = pose.position,
             Hold::Clamp => {
@@ -241,17 +248,17 @@ fn project(model: &Model, state: &mut State, work: &mut Work, p: &PaperSettings)
 }
 
 /// Velocities from the way made, then damping (P-11). There are no forces: what the state keeps of those is cleared.
-fn leave_rates(model: &Model, state: &mut State, scratch: &Scratch, h: f64) {
+fn leave_rates(model: &Model, state: &mut State, motion: &motion::Motion, h: f64) {
     let s = &model.settings;
     let keep_linear = libm::pow(1.0 - s.linear_damping, h) * libm::exp(-s.linear_drag * h);
     let keep_angular = libm::pow(1.0 - s.angular_damping, h) * libm::exp(-s.angular_drag * h);
     for (_, rod) in model.rods.iter() {
         for i in rod.particles() {
-            state.velocity[i] = (state.position[i] - scratch.start[i]) * (keep_linear / h);
+            state.velocity[i] = (state.position[i] - motion.start[i]) * (keep_linear / h);
         }
         for e in rod.elements() {
             // The inverse of the prediction, but for the length of the quaternion.
-            let turn = state.orientation[e] * scratch.start_frame[e].conjugate();
+            let turn = state.orientation[e] * motion.start_frame[e].conjugate();
             state.angular_velocity[e] =
                 DVec3::new(turn.x, turn.y, turn.z) * (2.0_f64.copysign(turn.w) * keep_angular / h);
         }

@@ -1,10 +1,12 @@
 //! The Newton matrix and right side of the rods.
 
+use crate::lanes::{Quat2, Sym2, Vec2, join, lanes};
 use crate::math::log;
 use crate::model::Model;
-use crate::rod::lanes::{Quat2, Sym2, Vec2, join, lanes};
+use crate::motion::Motion;
+use crate::rod::freedom::ClampJoint;
+use crate::rod::scratch::RodScratch;
 use crate::rod::strain;
-use crate::scratch::{ClampJoint, Scratch};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
@@ -20,16 +22,16 @@ pub(crate) enum Hessian {
 }
 
 /// Residual and Hessian of inertia, elasticity and loads at the iterate.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, h: f64, hessian: Hessian) {
-    for r in 0..scratch.rods.len() {
-        let rod = scratch.rods[r].0.clone();
+pub(crate) fn assemble(model: &Model, state: &State, motion: &Motion, rods: &mut RodScratch, h: f64, hessian: Hessian) {
+    for r in 0..rods.ranges.len() {
+        let rod = rods.ranges[r].0.clone();
         if is_flat(model, rod.start) {
-            assemble_rod::<true>(model, state, scratch, h, hessian, rod);
+            assemble_rod::<true>(model, state, motion, rods, (h, hessian), rod);
         } else {
-            assemble_rod::<false>(model, state, scratch, h, hessian, rod);
+            assemble_rod::<false>(model, state, motion, rods, (h, hessian), rod);
         }
     }
-    assemble_clamps(state, scratch);
+    assemble_clamps(state, rods);
 }
 
 /// Whether the rod that begins with particle `first` is stiffer one way than the other.
@@ -40,9 +42,9 @@ fn is_flat(model: &Model, first: usize) -> bool {
 fn assemble_rod<const FLAT: bool>(
     model: &Model,
     state: &State,
-    scratch: &mut Scratch,
-    h: f64,
-    hessian: Hessian,
+    motion: &Motion,
+    rods: &mut RodScratch,
+    (h, hessian): (f64, Hessian),
     rod: Range<usize>,
 ) {
     let last = rod.end - 1;
@@ -51,6 +53,7 @@ fn assemble_rod<const FLAT: bool>(
     let at = At::<FLAT> {
         model,
         state,
+        motion,
         inv_h2: 1.0 / (h * h),
         inv_h: 1.0 / h,
         exact: hessian == Hessian::Exact,
@@ -62,32 +65,32 @@ fn assemble_rod<const FLAT: bool>(
     // The first half in the low lane, the second in the high one.
     let mut carry = Carry::none();
     if half > 0 {
-        carry = at.carry(scratch, middle - 1).scaled(lanes(0.0, 1.0));
+        carry = at.carry(rods, middle - 1).scaled(lanes(0.0, 1.0));
     }
     for i in 0..half {
-        carry = at.block(scratch, rod.start + i, middle + i, &carry);
+        carry = at.block(rods, rod.start + i, middle + i, &carry);
     }
     carry = carry.high();
     if middle + half < last {
-        carry = at.block(scratch, last - 1, last - 1, &carry);
+        carry = at.block(rods, last - 1, last - 1, &carry);
     }
-    at.last_block(scratch, &carry);
+    at.last_block(rods, &carry);
 }
 
 /// The residual and the Hessian without the clamps of the blocks `held` of a rod, with the tensions that are in
-/// `scratch`.
+/// `rods`.
 pub(crate) fn assemble_blocks(
     model: &Model,
     state: &State,
-    scratch: &mut Scratch,
-    h: f64,
-    rod: &Range<usize>,
-    held: Range<usize>,
+    motion: &Motion,
+    rods: &mut RodScratch,
+    (h, rod, held): (f64, &Range<usize>, Range<usize>),
 ) {
     let last = rod.end - 1;
     let at = At::<true> {
         model,
         state,
+        motion,
         inv_h2: 1.0 / (h * h),
         inv_h: 1.0 / h,
         exact: false,
@@ -96,23 +99,23 @@ pub(crate) fn assemble_blocks(
         given: true,
         last,
     };
-    let mut carry = if held.start > rod.start { at.carry(scratch, held.start - 1) } else { Carry::none() };
+    let mut carry = if held.start > rod.start { at.carry(rods, held.start - 1) } else { Carry::none() };
     for e in held {
         if e == last {
-            at.last_block(scratch, &carry);
+            at.last_block(rods, &carry);
         } else {
-            carry = at.block(scratch, e, e, &carry);
+            carry = at.block(rods, e, e, &carry);
         }
     }
 }
 
 /// Adds the moments of the clamps.
-pub(crate) fn assemble_clamps(state: &State, scratch: &mut Scratch) {
-    for c in &scratch.clamps {
+pub(crate) fn assemble_clamps(state: &State, rods: &mut RodScratch) {
+    for c in &rods.clamps {
         let node = 2 * c.frame as usize + 1;
         let (moment, b) = clamp_terms(c, state.orientation[c.frame as usize]);
-        scratch.rhs[node] += if c.first { -moment } else { moment };
-        scratch.system.diagonal[node] += b;
+        rods.rhs[node] += if c.first { -moment } else { moment };
+        rods.system.diagonal[node] += b;
     }
 }
 
@@ -170,6 +173,7 @@ struct Element {
 struct At<'a, const FLAT: bool> {
     model: &'a Model,
     state: &'a State,
+    motion: &'a Motion,
     inv_h2: f64,
     inv_h: f64,
     exact: bool,
@@ -186,27 +190,29 @@ struct At<'a, const FLAT: bool> {
 impl<const FLAT: bool> At<'_, FLAT> {
     /// Writes the rows of two blocks, neither of them the last of the rod.
     #[inline(always)]
-    fn block(&self, scratch: &mut Scratch, low: usize, high: usize, before: &Carry) -> Carry {
-        let own = self.element(scratch, low, high);
-        let (inertial, inertia) = self.spin(scratch, low, high, &own.axis);
-        let (moment, kt) = self.joint(scratch, low + 1, high + 1);
+    fn block(&self, rods: &mut RodScratch, low: usize, high: usize, before: &Carry) -> Carry {
+        let own = self.element(rods, low, high);
+        let (inertial, inertia) = self.spin(low, high, &own.axis);
+        let (moment, kt) = self.joint(rods, low + 1, high + 1);
         let (model, state) = (self.model, self.state);
-        let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2 * scratch.heavier[0]);
-        let off = Vec2::load(scratch.target[low], scratch.target[high])
+        let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2 * self.motion.heavier[0]);
+        let off = Vec2::load(self.motion.target[low], self.motion.target[high])
             .less(&Vec2::load(state.position[low], state.position[high]));
-        let push =
-            Vec2::load(scratch.force[low], scratch.force[high]).plus(&off, w).less(&before.force).add(&own.force);
-        let torque = Vec2::load(scratch.torque[low], scratch.torque[high])
+        let push = Vec2::load(self.motion.force[low], self.motion.force[high])
+            .plus(&off, w)
+            .less(&before.force)
+            .add(&own.force);
+        let torque = Vec2::load(self.motion.torque[low], self.motion.torque[high])
             .add(&inertial)
             .add(&own.torque)
             .add(&moment.less(&before.moment));
         let none = Vec2::load(DVec3::ZERO, DVec3::ZERO);
         let half = if self.exact { moment.scaled(f64x2::splat(0.5)) } else { none };
-        (scratch.moment[low + 1], scratch.moment[high + 1]) = moment.split();
+        (rods.moment[low + 1], rods.moment[high + 1]) = moment.split();
         let (x, t) = ((2 * low, 2 * high), (2 * low + 1, 2 * high + 1));
-        (scratch.rhs[x.0], scratch.rhs[x.1]) = push.split();
-        (scratch.rhs[t.0], scratch.rhs[t.1]) = torque.split();
-        let system = &mut scratch.system;
+        (rods.rhs[x.0], rods.rhs[x.1]) = push.split();
+        (rods.rhs[t.0], rods.rhs[t.1]) = torque.split();
+        let system = &mut rods.system;
         (system.diagonal[x.0], system.diagonal[x.1]) = before.kx.add(&own.kx).add(&Sym2::scalar(w)).split();
         let (a, b) = join(own.kd);
         (system.next[x.0], system.next[x.1]) = (-a, -b);
@@ -226,10 +232,10 @@ impl<const FLAT: bool> At<'_, FLAT> {
     }
 
     /// Writes the rows of the last block, which has no element of its own.
-    fn last_block(&self, scratch: &mut Scratch, before: &Carry) {
+    fn last_block(&self, rods: &mut RodScratch, before: &Carry) {
         let e = self.last;
-        let w = self.model.mass[e] * (self.inv_h2 * scratch.heavier[0]);
-        let system = &mut scratch.system;
+        let w = self.model.mass[e] * (self.inv_h2 * self.motion.heavier[0]);
+        let system = &mut rods.system;
         system.diagonal[2 * e] = before.kx.add(&Sym2::scalar(f64x2::splat(w))).split().1;
         system.diagonal[2 * e + 1] = DMat3::IDENTITY;
         (system.ties[e], system.right[e]) = (([DVec3::ZERO; 2], 1.0), 0.0);
@@ -238,20 +244,20 @@ impl<const FLAT: bool> At<'_, FLAT> {
             system.next[node] = DMat3::ZERO;
             system.after[node] = DMat3::ZERO;
         }
-        scratch.rhs[2 * e] =
-            (scratch.target[e] - self.state.position[e]) * w + scratch.force[e] - before.force.split().1;
-        scratch.rhs[2 * e + 1] = DVec3::ZERO;
+        rods.rhs[2 * e] =
+            (self.motion.target[e] - self.state.position[e]) * w + self.motion.force[e] - before.force.split().1;
+        rods.rhs[2 * e + 1] = DVec3::ZERO;
     }
 
     /// What element `e` hands on to the block after it.
-    fn carry(&self, scratch: &Scratch, e: usize) -> Carry {
-        let own = self.element(scratch, e, e);
-        let (moment, kt) = self.joint(scratch, e + 1, e + 1);
+    fn carry(&self, rods: &RodScratch, e: usize) -> Carry {
+        let own = self.element(rods, e, e);
+        let (moment, kt) = self.joint(rods, e + 1, e + 1);
         Carry { force: own.force, kx: own.kx, moment, kt }
     }
 
     #[inline(always)]
-    fn element(&self, scratch: &Scratch, low: usize, high: usize) -> Element {
+    fn element(&self, rods: &RodScratch, low: usize, high: usize) -> Element {
         let (model, state) = (self.model, self.state);
         let [r1, r2, t] = Quat2::load(state.orientation[low], state.orientation[high]).axes();
         let x = &state.position;
@@ -260,8 +266,8 @@ impl<const FLAT: bool> At<'_, FLAT> {
         // Shear stiffness is the same in both directions: R K R^T = a I + b t t^T.
         let (k0, k1) = (model.stretch_stiffness[low], model.stretch_stiffness[high]);
         let a = lanes(k0.x, k1.x);
-        let (t0, t1) = (scratch.tension[low], scratch.tension[high]);
-        let ((c0, p0), (c1, p1)) = (scratch.axial(model, low), scratch.axial(model, high));
+        let (t0, t1) = (rods.tension[low], rods.tension[high]);
+        let ((c0, p0), (c1, p1)) = (rods.axial(model, low), rods.axial(model, high));
         let c = lanes(c0, c1);
         let along = t.dot(&d);
         // The length of an inextensible element is that between its ends, which shear does not change.
@@ -292,7 +298,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         ];
         let mut kt = Sym2::scalar(a * d.dot(&d)).square(&d, -a).square(&n, b);
         if self.exact {
-            let (s0, s1) = (scratch.shear[low], scratch.shear[high]);
+            let (s0, s1) = (rods.shear[low], rods.shear[high]);
             let half = l * f64x2::splat(0.5);
             let shear = r1.scaled(lanes(s0.x, s1.x) * half).plus(&r2, lanes(s0.y, s1.y) * half);
             kt = kt.less_product(&shear, &t);
@@ -310,12 +316,12 @@ impl<const FLAT: bool> At<'_, FLAT> {
     /// Inertial torque on frames with third directors `t`, and spin inertia in world axes over h^2. The change of the
     /// latter with the frame (gyroscopic moment) is of the order (radius / length)^2 for a thread and is left out.
     #[inline(always)]
-    fn spin(&self, scratch: &Scratch, low: usize, high: usize, t: &Vec2) -> (Vec2, Sym2) {
+    fn spin(&self, low: usize, high: usize, t: &Vec2) -> (Vec2, Sym2) {
         let q = &self.state.orientation;
-        let inv_h2 = self.inv_h2 * scratch.heavier[1];
+        let inv_h2 = self.inv_h2 * self.motion.heavier[1];
         let (i0, i1) = (self.model.inertia[low] * inv_h2, self.model.inertia[high] * inv_h2);
         let (x, z) = (lanes(i0.x, i1.x), lanes(i0.z, i1.z) - lanes(i0.x, i1.x));
-        let turn = Quat2::load(scratch.target_frame[low], scratch.target_frame[high])
+        let turn = Quat2::load(self.motion.target_frame[low], self.motion.target_frame[high])
             .times(&Quat2::load(q[low], q[high]).conjugate());
         let (u0, u1) = turn.split();
         let off = Vec2::load(log(u0), log(u1));
@@ -334,10 +340,10 @@ impl<const FLAT: bool> At<'_, FLAT> {
     /// Moments that the joints before two elements exert on the frames before them, and the stiffness against relative
     /// rotation; none where there is no joint.
     #[inline(always)]
-    fn joint(&self, scratch: &Scratch, low: usize, high: usize) -> (Vec2, Sym2) {
+    fn joint(&self, rods: &RodScratch, low: usize, high: usize) -> (Vec2, Sym2) {
         let (model, state) = (self.model, self.state);
         let q = &state.orientation;
-        let on = |e: usize| if e < self.last && scratch.joint_on[e] { 1.0 } else { 0.0 };
+        let on = |e: usize| if e < self.last && rods.joint_on[e] { 1.0 } else { 0.0 };
         let (half0, half1) = (model.rest_half[low], model.rest_half[high]);
         let j = strain::joints([q[low - 1], q[high - 1]], [q[low], q[high]], [half0, half1]);
         let (k0, k1) = (model.bend_stiffness[low] * on(low), model.bend_stiffness[high] * on(high));
@@ -346,7 +352,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         joint_terms::<FLAT>(
             &j,
             &plastic,
-            &Vec2::load(scratch.start_angle[low], scratch.start_angle[high]),
+            &Vec2::load(self.motion.start_angle[low], self.motion.start_angle[high]),
             &Vec2::load(k0, k1),
             gamma,
         )
@@ -438,18 +444,19 @@ mod tests {
             frame = crate::math::rotation_arc(frame * DVec3::Z, t) * frame;
             state.orientation[e] = exp(vector(&mut seed) * 3e-3) * frame * exp(DVec3::Z * 0.02 * e as f64);
         }
-        let mut scratch = Scratch::default();
-        scratch.fit(&model);
+        let (mut motion, mut rods) = (Motion::default(), RodScratch::default());
+        motion.fit(&model);
+        rods.fit(&model);
         let h = 10.0; // inertia out of the way
-        let gradient = |state: &State, scratch: &mut Scratch| {
-            scratch.target.copy_from_slice(&state.position);
-            scratch.target_frame.copy_from_slice(&state.orientation);
+        let mut gradient = |state: &State, rods: &mut RodScratch| {
+            motion.target.copy_from_slice(&state.position);
+            motion.target_frame.copy_from_slice(&state.orientation);
             for e in 0..n {
                 let f = element_strain(&model, state, e) * model.stretch_stiffness[e];
-                (scratch.tension[e], scratch.shear[e]) = (f.z, f.truncate());
+                (rods.tension[e], rods.shear[e]) = (f.z, f.truncate());
             }
-            assemble(&model, state, scratch, h, Hessian::Exact);
-            scratch.rhs.iter().map(|v| -*v).collect::<Vec<_>>()
+            assemble(&model, state, &motion, rods, h, Hessian::Exact);
+            rods.rhs.iter().map(|v| -*v).collect::<Vec<_>>()
         };
         let moved = |v: &[DVec3], eps: f64| {
             let mut s = State::default();
@@ -460,8 +467,8 @@ mod tests {
             }
             s
         };
-        let product = |scratch: &Scratch, v: &[DVec3], w: &[DVec3]| {
-            let s = &scratch.system;
+        let product = |rods: &RodScratch, v: &[DVec3], w: &[DVec3]| {
+            let s = &rods.system;
             let nodes = 2 * (n + 1);
             (0..nodes)
                 .map(|k| {
@@ -485,11 +492,11 @@ mod tests {
                 v[2 * e + 2] = v[2 * e] + v[2 * e + 1].cross(d);
             }
             v[2 * n + 1] = DVec3::ZERO;
-            gradient(&state, &mut scratch);
-            let want = product(&scratch, &v, &v);
+            gradient(&state, &mut rods);
+            let want = product(&rods, &v, &v);
             let e = 1e-5;
-            let up = gradient(&moved(&v, e), &mut scratch);
-            let down = gradient(&moved(&v, -e), &mut scratch);
+            let up = gradient(&moved(&v, e), &mut rods);
+            let down = gradient(&moved(&v, -e), &mut rods);
             // The frame of the last, unused node does not count.
             let got: f64 = (0..2 * n + 1).map(|k| (up[k] - down[k]).dot(v[k]) / (2.0 * e)).sum();
             // Left out: second derivatives of the joint's own angle, of the order angle^2 / 6, with angles of 0.1 here.

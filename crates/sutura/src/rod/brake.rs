@@ -6,7 +6,7 @@ use crate::math::outer;
 use crate::model::Model;
 use crate::model::reel::ReelLaw;
 use crate::rod::element_strain;
-use crate::scratch::Scratch;
+use crate::rod::scratch::RodScratch;
 use crate::state::State;
 use glam::DVec3;
 
@@ -66,8 +66,8 @@ pub(crate) fn settled(model: &Model, state: &State, brakes: &[Brake]) -> bool {
 
 /// Takes the axial stiffness of what slips out of the assembled system and makes its tension the limit. With C3 = t .
 /// (x1 - x0) - l and n = t x d, its derivative is -t, n, t on x0, the frame and x1.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { brakes, system, rhs, .. } = scratch;
+pub(crate) fn assemble(model: &Model, state: &State, rods: &mut RodScratch) {
+    let RodScratch { brakes, system, rhs, .. } = rods;
     for b in brakes.iter().filter(|b| b.slips) {
         let e = b.element;
         let t = state.orientation[e] * DVec3::Z;

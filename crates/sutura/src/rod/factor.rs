@@ -13,8 +13,8 @@
 //! through the zone from `lo` to `hi`, so that the inverse within the zone, which contacts need, follows from the zone
 //! alone.
 
+use crate::lanes::{Vec2, lanes};
 use crate::math::outer;
-use crate::rod::lanes::{Vec2, lanes};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 use wide::f64x2;

@@ -12,8 +12,8 @@
 //! Source: Kugelstadt and Schoemer 2016 (staggered frames); Deul et al. 2018 (physical compliance). The logarithm
 //! instead of 2 Im(q) and the symmetric rest are ours.
 
+use crate::lanes::{Quat2, Vec2, lanes};
 use crate::math::{log, log_and_root};
-use crate::rod::lanes::{Quat2, Vec2, lanes};
 use glam::{DQuat, DVec3};
 use wide::f64x2;
 

@@ -11,8 +11,8 @@
 
 use crate::math::solve_dense;
 use crate::rod::factor::System;
+use crate::rod::freedom::Freedom;
 use crate::row::ldl::Ldl;
-use crate::scratch::Freedom;
 use core::ops::Range;
 use glam::DVec3;
 

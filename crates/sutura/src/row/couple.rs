@@ -7,14 +7,17 @@
 //!
 //! [`cone`]: crate::row::cone
 
+use crate::effort::Effort;
+use crate::motion::Motion;
 use crate::params;
 use crate::rod::factor::{Block, Columns, System};
+use crate::rod::freedom::Freedom;
+use crate::rod::scratch::RodScratch;
 use crate::row::border::Border;
 use crate::row::cone::{Cone, Limits};
 use crate::row::dense::Dense;
 use crate::row::sparse::Sparse;
-use crate::row::{Start, shape, thread};
-use crate::scratch::{Freedom, Scratch};
+use crate::row::{Rows, shape, thread};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -332,6 +335,13 @@ pub(crate) struct Coupling {
     left: f64,
 }
 
+impl Coupling {
+    /// Residual of the last solution, in radii.
+    pub fn left(&self) -> f64 {
+        self.left
+    }
+}
+
 /// Gap that a row may keep, and its compliance, so that overlap from before is won back over a few substeps. `depth` is
 /// to what the force at the start presses, by a law of `compliance` now. A row that lay deeper, by `-start_gap`, ends
 /// at `RECOVER * old + (1 - RECOVER) * depth`, never deeper than the larger of the two (what is deeper than its force
@@ -347,14 +357,13 @@ pub(crate) fn regain(start_gap: f64, depth: f64, compliance: f64) -> (f64, f64) 
 }
 
 /// Forgets the contacts of the last substep.
-pub(crate) fn begin(scratch: &mut Scratch) {
-    scratch.rows.solver.entries.clear();
+pub(crate) fn begin(rows: &mut Rows) {
+    rows.solver.entries.clear();
 }
 
 /// Sets the zone of each rod: from the first to the last block that the small problem may touch.
-pub(crate) fn zones(scratch: &mut Scratch) {
-    let Scratch { rods, rows, .. } = scratch;
-    for (blocks, zone) in rods.iter_mut() {
+pub(crate) fn zones(ranges: &mut [(Range<usize>, Range<usize>)], rows: &Rows) {
+    for (blocks, zone) in ranges {
         let (mut lo, mut hi) = (usize::MAX, 0);
         let touched = rows
             .threads
@@ -371,15 +380,15 @@ pub(crate) fn zones(scratch: &mut Scratch) {
     }
 }
 
-/// Finds the contact forces at this iterate and adds the step that they cause to `scratch.step`.
-pub(crate) fn couple(state: &State, scratch: &mut Scratch) {
-    let may_spend = scratch.allowed - scratch.spent;
-    let Scratch { rods, rows, system, step, freedom, start, start_shape_pose, work, .. } = scratch;
-    let start = Start { position: start, shape: start_shape_pose };
+/// Finds the contact forces at this iterate and adds the step that they cause to `rods.step`.
+pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
+    let may_spend = effort.allowed - effort.spent;
+    let RodScratch { ranges: rods, system, step, freedom, .. } = rods;
+    let work = &mut effort.now;
     let entries = &mut rows.solver.entries;
     entries.clear();
-    thread::enter(state, &start, step, &mut rows.threads, entries);
-    shape::enter(state, &start, step, &mut rows.shapes, (&rows.sliders, &rows.border), entries);
+    thread::enter(state, motion, step, &mut rows.threads, entries);
+    shape::enter(state, motion, step, &mut rows.shapes, (&rows.sliders, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
@@ -498,8 +507,9 @@ fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec
 
 /// Replaces forces on the nodes by the step that they cause while the contacts that press go on pressing: the linear
 /// response of the last solution. The border's steps are to be set aside.
-pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
-    let Scratch { rods, rows, system, freedom, work, .. } = scratch;
+pub(crate) fn pressed_response(rods: &RodScratch, rows: &mut Rows, effort: &mut Effort, right: &mut [DVec3]) {
+    let RodScratch { ranges: rods, system, freedom, .. } = rods;
+    let work = &mut effort.now;
     let Coupling { entries, islands, active, right: more, change, b, .. } = &mut rows.solver;
     respond(rods, system, freedom, &mut rows.border, right);
     *work += 100.0 * right.len() as f64;
@@ -521,8 +531,9 @@ pub(crate) fn pressed_response(scratch: &mut Scratch, right: &mut [DVec3]) {
 
 /// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the
 /// step of both.
-pub(crate) fn again(scratch: &mut Scratch, right: &mut [DVec3]) {
-    let Scratch { rods, rows, system, step, freedom, work, .. } = scratch;
+pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort, right: &mut [DVec3]) {
+    let RodScratch { ranges: rods, system, step, freedom, .. } = rods;
+    let work = &mut effort.now;
     let Coupling { entries, islands, active, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
     steps.clear();
     rows.border.swap_steps(steps);
@@ -565,14 +576,8 @@ fn hand_over(entries: &mut [Entry], force: &[f64], threads: &mut [thread::Thread
     }
 }
 
-/// Whether the small problem was solved well enough for the step to count.
-pub(crate) fn solved(scratch: &Scratch) -> bool {
-    scratch.rows.solver.left < params::CONTACT_LEFT
-}
-
-/// Adds the entries' forces to `scratch.rhs`.
-pub(crate) fn add_forces(scratch: &mut Scratch) {
-    let Scratch { rows, rhs, .. } = scratch;
+/// Adds the entries' forces to a right side.
+pub(crate) fn add_forces(rows: &Rows, rhs: &mut [DVec3]) {
     for entry in &rows.solver.entries {
         for p in entry.ends() {
             p.push(entry.force, rhs);
@@ -581,11 +586,11 @@ pub(crate) fn add_forces(scratch: &mut Scratch) {
 }
 
 /// Work of the entries' forces along the step.
-pub(crate) fn work(scratch: &Scratch) -> f64 {
-    let border = &scratch.rows.border;
+pub(crate) fn work(rows: &Rows, step: &[DVec3]) -> f64 {
+    let border = &rows.border;
     let pushed = |e: &Entry| e.slider.map_or(0.0, |(k, d)| d.dot(e.force) * border.step(k));
-    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, &scratch.step)).sum::<f64>() + pushed(e);
-    scratch.rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
+    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, step)).sum::<f64>() + pushed(e);
+    rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
 }
 
 /// Computes how the two blocks that an endpoint touches move under unit forces along its components.

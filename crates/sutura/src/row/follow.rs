@@ -14,8 +14,9 @@
 //! one unknown per row; products with its matrix take two solutions of the rods, since their factor is there, and GMRES
 //! (Saad and Schultz 1986) needs a few of them: along a thread friction only hands on tension from row to row.
 
+use crate::effort::Effort;
+use crate::rod::scratch::RodScratch;
 use crate::row::{Rows, couple};
-use crate::scratch::Scratch;
 use glam::DVec3;
 
 /// Products after which GMRES ends.
@@ -42,30 +43,26 @@ pub(crate) struct Follow {
 }
 
 /// Corrects the step by the friction that its normal forces call for.
-pub(crate) fn follow(scratch: &mut Scratch) {
-    let mut memory = core::mem::take(&mut scratch.rows.follow);
+pub(crate) fn follow(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
+    let mut memory = core::mem::take(&mut rows.follow);
     memory.rows.clear();
-    memory.rows.extend(scratch.rows.shapes.iter().enumerate().filter(|(_, r)| r.slides()).map(|(k, _)| k as u32));
+    memory.rows.extend(rows.shapes.iter().enumerate().filter(|(_, r)| r.slides()).map(|(k, _)| k as u32));
     if !memory.rows.is_empty() {
-        memory.correct(scratch);
+        memory.correct(rods, rows, effort);
     }
-    scratch.rows.follow = memory;
+    rows.follow = memory;
 }
 
 impl Follow {
-    fn correct(&mut self, scratch: &mut Scratch) {
+    fn correct(&mut self, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
         let m = self.rows.len();
         for _ in 0..PASSES {
             self.missing.clear();
             self.active.clear();
             let mut due = false;
-            let largest = self.rows.iter().map(|k| scratch.rows.shapes[*k as usize].normal_force).fold(0.0, f64::max);
+            let largest = self.rows.iter().map(|k| rows.shapes[*k as usize].normal_force).fold(0.0, f64::max);
             for k in &self.rows {
-                let (missing, active) = scratch.rows.shapes[*k as usize].missing(
-                    &scratch.step,
-                    &scratch.rows.sliders,
-                    &scratch.rows.border,
-                );
+                let (missing, active) = rows.shapes[*k as usize].missing(&rods.step, &rows.sliders, &rows.border);
                 due |= missing.abs() > 0.5 * crate::params::OFF_BALANCE * largest;
                 self.missing.push(missing);
                 self.active.push(active);
@@ -73,42 +70,42 @@ impl Follow {
             if !due {
                 return;
             }
-            self.solve(scratch, m);
+            self.solve(rods, rows, effort, m);
             for (k, v) in self.rows.iter().zip(&self.change) {
-                scratch.rows.shapes[*k as usize].grow(*v);
+                rows.shapes[*k as usize].grow(*v);
             }
             // The contacts find their forces anew, and the step takes up both.
-            self.push(scratch);
-            couple::again(scratch, &mut self.step);
+            self.push(rods, rows);
+            couple::again(rods, rows, effort, &mut self.step);
         }
     }
 
     /// Leaves in `step`, and at the border, the forces of the changes.
-    fn push(&mut self, scratch: &mut Scratch) {
+    fn push(&mut self, rods: &RodScratch, rows: &mut Rows) {
         self.step.clear();
-        self.step.resize(scratch.step.len(), DVec3::ZERO);
+        self.step.resize(rods.step.len(), DVec3::ZERO);
         for (k, v) in self.rows.iter().zip(&self.change) {
-            let Rows { shapes, sliders, border, .. } = &mut scratch.rows;
+            let Rows { shapes, sliders, border, .. } = rows;
             shapes[*k as usize].push(*v, &mut self.step, sliders, border);
         }
     }
 
     /// `change <- change - d(mu N)` along the step that it causes.
-    fn product(&mut self, scratch: &mut Scratch) {
-        self.push(scratch);
+    fn product(&mut self, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
+        self.push(rods, rows);
         self.border.clear();
-        scratch.rows.border.swap_steps(&mut self.border);
-        couple::pressed_response(scratch, &mut self.step);
+        rows.border.swap_steps(&mut self.border);
+        couple::pressed_response(rods, rows, effort, &mut self.step);
         for ((k, v), active) in self.rows.iter().zip(&mut self.change).zip(&self.active) {
             if *active {
-                *v -= scratch.rows.shapes[*k as usize].gained(&self.step, &scratch.rows.sliders, &scratch.rows.border);
+                *v -= rows.shapes[*k as usize].gained(&self.step, &rows.sliders, &rows.border);
             }
         }
-        scratch.rows.border.swap_steps(&mut self.border);
+        rows.border.swap_steps(&mut self.border);
     }
 
     /// GMRES: leaves in `change` what takes away all but a small part of `missing`.
-    fn solve(&mut self, scratch: &mut Scratch, m: usize) {
+    fn solve(&mut self, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort, m: usize) {
         let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let size = norm(&self.missing);
         self.basis.clear();
@@ -122,7 +119,7 @@ impl Follow {
             let j = count;
             self.change.clear();
             self.change.extend_from_slice(&self.basis[j * m..(j + 1) * m]);
-            self.product(scratch);
+            self.product(rods, rows, effort);
             for i in 0..=j {
                 let b = &self.basis[i * m..(i + 1) * m];
                 let part: f64 = self.change.iter().zip(b).map(|(x, y)| x * y).sum();

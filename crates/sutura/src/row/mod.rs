@@ -15,15 +15,11 @@ pub(crate) mod sparse;
 pub(crate) mod thread;
 pub(crate) mod weld;
 
-use crate::math::Pose;
-use crate::scratch::Scratch;
-use glam::DVec3;
-
-/// Where things were at the start of the substep.
-pub(crate) struct Start<'a> {
-    pub position: &'a [DVec3],
-    pub shape: &'a [Pose],
-}
+use crate::collide::{Candidates, Pressed};
+use crate::model::Model;
+use crate::motion::Motion;
+use crate::params;
+use crate::state::State;
 
 /// The rows of one substep and the memory of their solver.
 #[derive(Default)]
@@ -43,22 +39,51 @@ impl Rows {
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty() && self.threads.is_empty()
     }
+
+    /// Whether the small problem was solved well enough for the step to count.
+    pub fn solved(&self) -> bool {
+        self.solver.left() < params::CONTACT_LEFT
+    }
 }
 
-/// How deep the contact forces at two elements or their neighbors press them into each other \[m\].
-pub(crate) fn pressed_threads(scratch: &Scratch, a: usize, b: usize) -> f64 {
-    let near = |r: &&thread::ThreadRow| {
-        let [c, d] = r.elements();
-        c.abs_diff(a) <= 1 && d.abs_diff(b) <= 1
-    };
-    scratch.rows.threads.iter().filter(near).map(thread::ThreadRow::depth).fold(0.0, f64::max)
+impl Pressed for Rows {
+    fn threads(&self, a: usize, b: usize) -> f64 {
+        let near = |r: &&thread::ThreadRow| {
+            let [c, d] = r.elements();
+            c.abs_diff(a) <= 1 && d.abs_diff(b) <= 1
+        };
+        self.threads.iter().filter(near).map(thread::ThreadRow::depth).fold(0.0, f64::max)
+    }
+
+    fn shape(&self, shape: u32, element: usize) -> f64 {
+        // In the order of their places.
+        let from = self.shapes.partition_point(|r| r.on().1 + 1 < element);
+        let near = self.shapes[from..].iter().take_while(|r| r.on().1 <= element + 1);
+        near.filter(|r| r.on().0 == shape).map(shape::ShapeRow::depth).fold(0.0, f64::max)
+    }
 }
 
-/// How deep the contact forces at an element or its neighbors press it into a shape \[m\].
-pub(crate) fn pressed_shape(scratch: &Scratch, shape: u32, element: usize) -> f64 {
-    // In the order of their places.
-    let rows = &scratch.rows.shapes;
-    let from = rows.partition_point(|r| r.on().1 + 1 < element);
-    let near = rows[from..].iter().take_while(|r| r.on().1 <= element + 1);
-    near.filter(|r| r.on().0 == shape).map(shape::ShapeRow::depth).fold(0.0, f64::max)
+/// Collects the rows of a solve of this length and gives them the forces of the last one.
+pub(crate) fn begin(
+    model: &Model,
+    state: &State,
+    motion: &Motion,
+    candidates: &Candidates,
+    rows: &mut Rows,
+    length: f64,
+) {
+    thread::begin(model, state, motion, candidates, rows);
+    shape::begin(model, state, motion, candidates, rows, length);
+}
+
+/// Adds rows that the iterate calls for. Whether there are any.
+pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) -> bool {
+    let threads = thread::extend(model, state, motion, candidates, rows);
+    shape::extend(model, state, motion, candidates, rows) || threads
+}
+
+/// Leaves the contacts in the state, for the next substep to start from.
+pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mut Rows) {
+    thread::store(state, motion, rows);
+    shape::store(model, state, motion, rows);
 }

@@ -22,16 +22,18 @@
 //!
 //! [`couple`]: crate::row::couple
 
-use crate::collide::{APART, Collider, Distance};
+use crate::collide::{Candidates, Pressed};
 use crate::math::{Pose, outer};
+use crate::model::collider::{APART, Collider, Distance};
 use crate::model::shape::ShapeMotion;
 use crate::model::{Model, ShapeModel};
+use crate::motion::Motion;
 use crate::params;
-use crate::row::Start;
+use crate::rod::scratch::RodScratch;
+use crate::row::Rows;
 use crate::row::border::Border;
 use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::row::pushed::Sliders;
-use crate::scratch::Scratch;
 use crate::state::{ShapeContact, State};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -309,8 +311,8 @@ impl Site<'_> {
 }
 
 /// Collects the rows of the substep and gives them the forces of the last one.
-pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch, h: f64) {
-    let Scratch { candidates, start, start_shape_pose, rows, .. } = scratch;
+pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows, h: f64) {
+    let Motion { start, start_shape_pose, .. } = motion;
     let (rows, sliders) = (&mut rows.shapes, &mut rows.sliders);
     rows.clear();
     sliders.begin(model, h);
@@ -506,13 +508,14 @@ fn across(normal: DVec3, smooth: Option<DVec3>) -> DVec3 {
 }
 
 /// Looks where the row is now; its point on the centerline.
-fn look(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow) -> DVec3 {
+fn look(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let shape = model.shapes.at(row.shape).expect("rows name living shapes");
     let p = state.position[e].lerp(state.position[e + 1], row.s);
-    let from = start.position[e].lerp(start.position[e + 1], row.s);
+    let from = motion.start[e].lerp(motion.start[e + 1], row.s);
     let k = row.shape as usize;
-    let d = shape.collider.follow((&start.shape[k], from, row.before), (&state.shape_pose[k], p), row.normal);
+    let d =
+        shape.collider.follow((&motion.start_shape_pose[k], from, row.before), (&state.shape_pose[k], p), row.normal);
     row.normal = across(d.normal, row.smooth);
     row.gap = d.value - row.radius * (1.0 + 2.0 * params::KEEP);
     p
@@ -520,20 +523,23 @@ fn look(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow) -> 
 
 /// Slip of the thread against the shape's surface since the start of the substep, with what was still to be undone
 /// then.
-fn slip(state: &State, start: &Start<'_>, row: &ShapeRow) -> DVec3 {
+fn slip(state: &State, motion: &Motion, row: &ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
-    let carried =
-        surface_motion(&start.shape[row.shape as usize], &state.shape_pose[row.shape as usize], p - n * row.radius);
-    let slip = p - start.position[e].lerp(start.position[e + 1], row.s) - carried + row.drift;
+    let carried = surface_motion(
+        &motion.start_shape_pose[row.shape as usize],
+        &state.shape_pose[row.shape as usize],
+        p - n * row.radius,
+    );
+    let slip = p - motion.start[e].lerp(motion.start[e + 1], row.s) - carried + row.drift;
     slip - n * n.dot(slip)
 }
 
 /// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first
 /// iteration the row is linearized where it carried its force: Newton starts where velocity leads, which may be just
 /// off the surface.
-fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, first: bool) -> DVec3 {
-    look(model, state, start, row);
+fn press(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow, first: bool) -> DVec3 {
+    look(model, state, motion, row);
     let n = row.normal;
     let depth = (-row.gap).max(0.0);
     row.pressed = row.hardness * depth * depth;
@@ -546,7 +552,7 @@ fn press(model: &Model, state: &State, start: &Start<'_>, row: &mut ShapeRow, fi
         row.stiffness = 2.0 * row.hardness * depth;
         row.normal_force = row.pressed;
     }
-    row.anchor - n * n.dot(row.anchor) - slip(state, start, row) * row.stiffness
+    row.anchor - n * n.dot(row.anchor) - slip(state, motion, row) * row.stiffness
 }
 
 /// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has
@@ -585,12 +591,10 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
 }
 
 /// Decides which firm rows slide, and takes those whose law is far from their linearization out of the rods' matrix.
-pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
-    let Scratch { rows, start, start_shape_pose, .. } = scratch;
-    let start = Start { position: start, shape: start_shape_pose };
+pub(crate) fn review(model: &Model, state: &State, motion: &Motion, rows: &mut Rows, first: bool) {
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
-        let trial = press(model, state, &start, row, first);
+        let trial = press(model, state, motion, row, first);
         // Much deeper than its force says, its law is far from the parabola's tangent. One that slides and stops by
         // turns may do so with another one for ever: the small problem decides all of them at once.
         if row.gap < -3.0 * (row.carried / row.hardness).sqrt()
@@ -605,17 +609,23 @@ pub(crate) fn review(model: &Model, state: &State, scratch: &mut Scratch, first:
 }
 
 /// Adds forces and stiffness of the firm rows at the iterate, and looks where the others are.
-pub(crate) fn assemble(model: &Model, state: &State, scratch: &mut Scratch, first: bool) {
-    let Scratch { rows, system, rhs, start, start_shape_pose, .. } = scratch;
+pub(crate) fn assemble(
+    model: &Model,
+    state: &State,
+    motion: &Motion,
+    rods: &mut RodScratch,
+    rows: &mut Rows,
+    first: bool,
+) {
+    let RodScratch { system, rhs, .. } = rods;
     rows.border.clear(rows.sliders.count() + rows.welds.count());
-    rows.sliders.assemble(model, state, start_shape_pose, &mut rows.border);
-    let start = Start { position: start, shape: start_shape_pose };
+    rows.sliders.assemble(model, state, &motion.start_shape_pose, &mut rows.border);
     for row in &mut rows.shapes {
         if !row.firm {
-            look(model, state, &start, row);
+            look(model, state, motion, row);
             continue;
         }
-        let trial = press(model, state, &start, row, first);
+        let trial = press(model, state, motion, row, first);
         let stiffness = forces(row, trial);
         let e = row.element as usize;
         let (a, b) = (1.0 - row.s, row.s);
@@ -638,8 +648,7 @@ fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders, border: &Border) -> 
 }
 
 /// Notes the forces that a step of this length predicts for the firm rows.
-pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
-    let Scratch { rows, step, .. } = scratch;
+pub(crate) fn predict(rows: &mut Rows, step: &[DVec3], scale: f64) {
     let (sliders, border) = (&rows.sliders, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale)
@@ -648,8 +657,7 @@ pub(crate) fn predict(scratch: &mut Scratch, scale: f64) {
 }
 
 /// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
-pub(crate) fn work_unforeseen(scratch: &Scratch) -> f64 {
-    let Scratch { rows, step, .. } = scratch;
+pub(crate) fn work_unforeseen(rows: &Rows, step: &[DVec3]) -> f64 {
     let on = |row: &ShapeRow| {
         (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders, &rows.border))
     };
@@ -659,7 +667,7 @@ pub(crate) fn work_unforeseen(scratch: &Scratch) -> f64 {
 /// Adds the rows that may act to the small problem.
 pub(crate) fn enter(
     state: &State,
-    start: &Start<'_>,
+    motion: &Motion,
     step: &[DVec3],
     rows: &mut [ShapeRow],
     shared: (&Sliders, &Border),
@@ -678,7 +686,7 @@ pub(crate) fn enter(
         row.entered = row.compliance();
         let axes = row.axes();
         let [n, t1, t2] = axes;
-        let slip = slip(state, start, row) + moved - row.anchor * row.entered;
+        let slip = slip(state, motion, row) + moved - row.anchor * row.entered;
         let (allowed, normal) = regain(row.start_gap, (row.carried / row.hardness).sqrt(), row.entered);
         let end = Endpoint::new(e, row.s, axes);
         entries.push(Entry {
@@ -706,9 +714,14 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 
 /// Whether the iterate agrees with the forces that it was computed with: what the law says now against its
 /// linearization.
-pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, iterations: u32) -> bool {
-    let Scratch { rows, start, start_shape_pose, step, .. } = scratch;
-    let start = Start { position: start, shape: start_shape_pose };
+pub(crate) fn settled(
+    model: &Model,
+    state: &State,
+    motion: &Motion,
+    rows: &mut Rows,
+    step: &[DVec3],
+    iterations: u32,
+) -> bool {
     let (sliders, border) = (&rows.sliders, &rows.border);
     let mut settled = true;
     // Rod by rod: what a taut one bears says nothing about a light one.
@@ -717,7 +730,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
         for row in rows {
             let mut now = *row;
             if row.firm {
-                let trial = press(model, state, &start, &mut now, false);
+                let trial = press(model, state, motion, &mut now, false);
                 decide(&mut now, trial);
                 forces(&mut now, trial);
                 // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the
@@ -730,7 +743,7 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
                     && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
-                look(model, state, &start, &mut now);
+                look(model, state, motion, &mut now);
                 if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
                     (row.wanted, settled) = (true, false);
                 }
@@ -743,22 +756,22 @@ pub(crate) fn settled(model: &Model, state: &State, scratch: &mut Scratch, itera
 /// Adds rows where the iterate comes nearer to a shape than the forces there press it, although all rows are satisfied:
 /// a row keeps its place on the thread, and the edge or wall that it was set up against may have come to another. True
 /// when any was added.
-pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
-    let mut fresh = core::mem::take(&mut scratch.rows.fresh_shapes);
+pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, all: &mut Rows) -> bool {
+    let mut fresh = core::mem::take(&mut all.fresh_shapes);
     fresh.clear();
     let x = &state.position;
-    for (slot, e) in &scratch.candidates.shapes {
+    for (slot, e) in &candidates.shapes {
         let (k, e) = (*slot as usize, *e as usize);
         let collider = &model.shapes.at(*slot).expect("candidate shapes live").collider;
-        let r = scratch.radius[e];
+        let r = candidates.radius[e];
         let length = (x[e + 1] - x[e]).length();
-        let (start_pose, pose) = (&scratch.start_shape_pose[k], &state.shape_pose[k]);
+        let (start_pose, pose) = (&motion.start_shape_pose[k], &state.shape_pose[k]);
         let site = Site {
             model,
             slot: *slot,
             element: e,
             pushed: DVec3::ZERO,
-            start: &scratch.start,
+            start: &motion.start,
             start_pose,
             now: x,
             pose,
@@ -769,14 +782,12 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         if ends[0].value.min(ends[1].value) - 0.5 * length >= least {
             continue;
         }
-        let rows = &scratch.rows.shapes;
+        let rows = &all.shapes;
         // Of a mesh facets are told apart; other surfaces turn in one piece.
         let apart = if matches!(collider, Collider::Surface(_)) { APART } else { 0.7 };
         let mut pressed = None;
         let mut look = |s: f64, d: Distance| {
-            if d.value >= least
-                || d.value >= least - *pressed.get_or_insert_with(|| super::pressed_shape(scratch, *slot, e))
-            {
+            if d.value >= least || d.value >= least - *pressed.get_or_insert_with(|| all.shape(*slot, e)) {
                 return;
             }
             let at = |x: &[DVec3]| x[e].lerp(x[e + 1], s);
@@ -819,24 +830,22 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
         });
     }
     let any = !fresh.is_empty();
-    scratch.rows.shapes.extend_from_slice(&fresh);
+    all.shapes.extend_from_slice(&fresh);
     // Rod by rod, as they are looked at.
-    scratch.rows.shapes.sort_unstable_by(|a, b| a.place().total_cmp(&b.place()).then(a.shape.cmp(&b.shape)));
-    scratch.rows.fresh_shapes = fresh;
+    all.shapes.sort_unstable_by(|a, b| a.place().total_cmp(&b.place()).then(a.shape.cmp(&b.shape)));
+    all.fresh_shapes = fresh;
     any
 }
 
 /// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed
 /// with.
-pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
-    let Scratch { rows, start, start_shape_pose, .. } = scratch;
-    let start = Start { position: start, shape: start_shape_pose };
+pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mut Rows) {
     let mut contacts = core::mem::take(&mut state.shape_contacts);
     contacts.clear();
     for row in &mut rows.shapes {
         // How far it slid, and slip that is still to be undone.
         let (slid, drift) = if row.firm {
-            let trial = press(model, state, &start, row, false);
+            let trial = press(model, state, motion, row, false);
             if row.mode != Mode::Sticks {
                 decide(row, trial);
             }
@@ -844,8 +853,8 @@ pub(crate) fn finish(model: &Model, state: &mut State, scratch: &mut Scratch) {
             let beyond = trial.length() - row.friction.length();
             (if beyond > 0.0 { beyond / row.stiffness } else { 0.0 }, DVec3::ZERO)
         } else {
-            look(model, state, &start, row);
-            let left = slip(state, &start, row) + (row.friction - row.anchor) * row.entered;
+            look(model, state, motion, row);
+            let left = slip(state, motion, row) + (row.friction - row.anchor) * row.entered;
             let at_limit = row.friction.length() >= 0.9999 * row.mu() * row.normal_force;
             if at_limit { (left.length(), DVec3::ZERO) } else { (0.0, left.clamp_length_max(0.1 * row.radius)) }
         };

@@ -15,12 +15,13 @@
 //!
 //! [`couple`]: crate::row::couple
 
-use crate::collide::{Candidates, relative_motion, segment};
+use crate::collide::{Candidates, relative_motion};
 use crate::model::Model;
+use crate::motion::Motion;
 use crate::params;
-use crate::row::Start;
+use crate::row::Rows;
 use crate::row::couple::{Endpoint, Entry, Source, regain};
-use crate::scratch::Scratch;
+use crate::segment;
 use crate::state::{State, ThreadContact};
 use glam::DVec3;
 
@@ -100,9 +101,9 @@ impl ThreadRow {
     }
 
     /// Slip of the two against each other since the start of the substep, as a vector.
-    fn slip(&self, state: &State, start: &Start<'_>) -> DVec3 {
+    fn slip(&self, state: &State, motion: &Motion) -> DVec3 {
         let n = self.axes[0];
-        let slip = self.apart(&state.position) - self.apart(start.position);
+        let slip = self.apart(&state.position) - self.apart(&motion.start);
         slip - n * n.dot(slip)
     }
 
@@ -139,8 +140,8 @@ impl ThreadRow {
 
 /// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's
 /// forces.
-pub(crate) fn begin(model: &Model, state: &State, scratch: &mut Scratch) {
-    let Scratch { candidates, start, rows, .. } = scratch;
+pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) {
+    let start = &motion.start;
     rows.threads.clear();
     let old = &state.thread_contacts;
     for (a, b) in &candidates.threads {
@@ -320,13 +321,7 @@ fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(
-    state: &State,
-    start: &Start<'_>,
-    step: &[DVec3],
-    rows: &mut [ThreadRow],
-    entries: &mut Vec<Entry>,
-) {
+pub(crate) fn enter(state: &State, motion: &Motion, step: &[DVec3], rows: &mut [ThreadRow], entries: &mut Vec<Entry>) {
     for (k, row) in rows.iter_mut().enumerate() {
         // Where the step without contact forces would leave the row.
         let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
@@ -338,7 +333,7 @@ pub(crate) fn enter(
             continue;
         }
         row.entered = row.compliance();
-        let slip = row.slip(state, start) + moved + row.drift - row.anchor * row.entered;
+        let slip = row.slip(state, motion) + moved + row.drift - row.anchor * row.entered;
         let (allowed, normal) = regain(row.start_gap, row.carried, row.entered);
         let [a, b] = row.endpoints();
         entries.push(Entry {
@@ -360,14 +355,14 @@ pub(crate) fn enter(
 /// straight way from the start of the substep to where the update leads; a pair that would goes most of the way there.
 /// (Only that way counts, as where a substep is accepted: a prediction may have brought two pieces into or past each
 /// other, and the way back is free.)
-pub(crate) fn limit(state: &State, scratch: &Scratch, scale: f64) -> f64 {
-    let (x, start, step) = (&state.position, &scratch.start, &scratch.step);
+pub(crate) fn limit(state: &State, motion: &Motion, candidates: &Candidates, step: &[DVec3], scale: f64) -> f64 {
+    let (x, start) = (&state.position, &motion.start);
     let mut scale = scale;
-    for (a, b) in &scratch.candidates.threads {
+    for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
         let corners = [a, a + 1, b, b + 1];
         let moved = largest_between(corners.map(|i| step[2 * i] * scale));
-        let sum = scratch.radius[a] + scratch.radius[b];
+        let sum = candidates.radius[a] + candidates.radius[b];
         if moved < 0.2 * sum {
             continue;
         }
@@ -410,14 +405,14 @@ fn keeps_apart(from: [DVec3; 4], way: [DVec3; 4], sum: f64) -> bool {
 
 /// Adds rows where the iterate brings two pieces nearer than allowed although all rows are satisfied. True when any was
 /// added, or when one was left out of the small problem.
-pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> bool {
-    let Scratch { candidates, start, rows, .. } = scratch;
+pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) -> bool {
+    let start = &motion.start;
     let x = &state.position;
     let fresh = &mut rows.fresh;
     fresh.clear();
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
-        let sum = scratch.radius[a] + scratch.radius[b];
+        let sum = candidates.radius[a] + candidates.radius[b];
         let least = sum * (1.0 + params::KEEP - params::SLACK);
         let middle = 0.5 * (x[a] + x[a + 1] - x[b] - x[b + 1]).length()
             - 0.5 * ((x[a + 1] - x[a]).length() + (x[b + 1] - x[b]).length());
@@ -468,14 +463,13 @@ pub(crate) fn extend(model: &Model, state: &State, scratch: &mut Scratch) -> boo
 
 /// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left
 /// undone.
-pub(crate) fn finish(state: &mut State, scratch: &Scratch) {
-    let start = Start { position: &scratch.start, shape: &scratch.start_shape_pose };
+pub(crate) fn store(state: &mut State, motion: &Motion, rows: &Rows) {
     let mut contacts = core::mem::take(&mut state.thread_contacts);
     contacts.clear();
-    for row in scratch.rows.threads.iter().filter(|r| r.force.x > 0.0) {
+    for row in rows.threads.iter().filter(|r| r.force.x > 0.0) {
         let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
         let limit = row.mu[usize::from(row.sliding)] * row.force.x;
-        let left = row.drift + row.slip(state, &start) + (friction - row.anchor) * row.entered;
+        let left = row.drift + row.slip(state, motion) + (friction - row.anchor) * row.entered;
         let at_limit = friction.length() >= 0.9999 * limit;
         let sliding = at_limit && left.length() > params::SLIP * row.radii[0].min(row.radii[1]);
         let drift = if at_limit { DVec3::ZERO } else { left.clamp_length_max(0.1 * row.radii[0]) };

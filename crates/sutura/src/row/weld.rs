@@ -9,8 +9,11 @@
 use crate::math::{exp, skew};
 use crate::model::Model;
 use crate::rod::assemble::clamp_terms;
+use crate::rod::freedom::{ClampJoint, Freedom};
+use crate::rod::half_angle;
+use crate::rod::scratch::RodScratch;
+use crate::row::Rows;
 use crate::row::border::Border;
-use crate::scratch::{ClampJoint, Freedom, Scratch};
 use crate::state::State;
 use glam::{DMat3, DQuat, DVec3};
 
@@ -74,7 +77,7 @@ impl Welds {
                             rest_half: half.side.rest_half,
                             stiffness: model.section[half.frame].bend / (0.5 * model.rest_length[half.frame]),
                             damping,
-                            start: half.angle(orientation, state.orientation[half.frame]),
+                            start: half_angle(&half, orientation, state.orientation[half.frame]),
                         },
                         moment: DVec3::ZERO,
                         stiffness: DMat3::ZERO,
@@ -153,9 +156,9 @@ fn vector(border: &Border, k: usize) -> DVec3 {
 }
 
 /// Makes the rows of welded particles those of the weld: the rods are assembled, nothing is taken out yet.
-pub(crate) fn gather(model: &Model, state: &State, scratch: &mut Scratch, exact: bool) {
-    let Scratch { rows, system, rhs, .. } = scratch;
-    let crate::row::Rows { welds, border, sliders, .. } = rows;
+pub(crate) fn gather(model: &Model, state: &State, rods: &mut RodScratch, rows: &mut Rows, exact: bool) {
+    let RodScratch { system, rhs, .. } = rods;
+    let Rows { welds, border, sliders, .. } = rows;
     let first = sliders.count();
     let Welds { welds, joints, links } = welds;
     // A pushed shape that touches an element beside a weld couples with the weld.

@@ -2,7 +2,8 @@
 
 use crate::handle::Slots;
 use crate::math::Pose;
-use crate::model::grip::{Drive, Hold, LoadKind};
+pub(crate) use crate::model::grip::LoadState;
+use crate::model::grip::{Drive, Hold};
 use crate::model::reel::ReelLaw;
 use glam::{DQuat, DVec3};
 
@@ -62,6 +63,26 @@ pub struct State {
     pub(crate) shape_contacts: Vec<ShapeContact>,
 }
 
+/// States to go back to, one per halving depth.
+#[derive(Default)]
+pub(crate) struct Saved(Vec<State>);
+
+impl Saved {
+    pub fn save(&mut self, depth: u32, state: &State) {
+        let depth = depth as usize;
+        if self.0.len() <= depth {
+            self.0.resize_with(depth + 1, State::default);
+        }
+        self.0[depth].copy_from(state);
+    }
+    pub fn at(&self, depth: u32) -> &State {
+        &self.0[depth as usize]
+    }
+    pub fn restore(&self, depth: u32, state: &mut State) {
+        state.copy_from(self.at(depth));
+    }
+}
+
 /// A grip in action.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GripState {
@@ -102,13 +123,6 @@ pub(crate) struct ReelState {
     /// Length fed in less length drawn back since then \[m\], and elements added less those taken away.
     pub fed: f64,
     pub added: i32,
-}
-
-/// A load in action.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct LoadState {
-    pub rod: u32,
-    pub kind: LoadKind,
 }
 
 /// A thread-thread contact that the next substep starts from.

@@ -1,9 +1,9 @@
 //! Distance from points and elements to shapes. The shapes themselves and their closest points are parry3d's.
 
-use crate::collide::segment;
 use crate::error::Error;
 use crate::math::Pose;
 use crate::model::shape::Geometry;
+use crate::segment;
 use glam::DVec3;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};

@@ -438,7 +438,7 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
         5 => rod.material.bend_scale = x.min(1.0),
         6 => {
             rod.material.plasticity =
-                Some(Plasticity { yield_curvature: x, yield_twist: wild(d), hardening: d.even(0.0, 0.999) })
+                Some(Plasticity { yield_curvature: x, yield_twist: wild(d), hardening: d.even(0.0, 0.999) });
         }
         7 => rod.section = Section::Rectangle([1e-4 * x, 1e-4 * wild(d)]),
         8 => rod.pretwist = x,
@@ -483,7 +483,7 @@ fn make_absurd(d: &mut Draw, scene: &mut Scene) {
             LoadKind::Point { place: Place::End, force: DVec3::ZERO, torque: d.direction() * (1e-6 * x) },
         )),
         28 => {
-            scene.loads.push((number, LoadKind::Mass { place: Place::Start, mass: x, inertia: DVec3::splat(wild(d)) }))
+            scene.loads.push((number, LoadKind::Mass { place: Place::Start, mass: x, inertia: DVec3::splat(wild(d)) }));
         }
         29 => {
             for grip in &mut scene.grips {

@@ -37,7 +37,7 @@ fn finish(throw: &[Run], spiral: &[Run]) -> Outcome {
             direct: moved(direct),
         });
         let mut check = |what: String, bar: &str, found: String, passed: bool| {
-            out.checks.push(Check::new(what, bar, found, passed))
+            out.checks.push(Check::new(what, bar, found, passed));
         };
         check(format!("direct, {what}: drift in 3 s"), "<= 0.05 mm", mm(direct.drift), direct.drift <= 5e-5);
         check(

@@ -449,7 +449,7 @@ pub fn all(name: &str, hold: Hold, share: f64, others: &[u32], smooth_until: Opt
     let (lead, run) = direct(name, hold, share);
     let mut runs = vec![run];
     let mut go = |name: &str, steps: u32, gravity: f64| {
-        runs.push(paper(&lead, name, PaperSettings::default(), Pace { steps, gravity, smooth_until }))
+        runs.push(paper(&lead, name, PaperSettings::default(), Pace { steps, gravity, smooth_until }));
     };
     go(TRUE, 1, 1.0);
     if lead.settings.gravity != DVec3::ZERO {

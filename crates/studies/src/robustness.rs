@@ -54,7 +54,7 @@ fn examine(name: &str, scene: &Scene) -> Seen {
         Ok(hash) if hash == seen.hash => {}
         Ok(hash) => {
             seen.fault =
-                Some(format!("inserted in another order and split by snapshots: {hash:016x} for {:016x}", seen.hash))
+                Some(format!("inserted in another order and split by snapshots: {hash:016x} for {:016x}", seen.hash));
         }
         Err(e) => seen.fault = Some(format!("its own snapshot: {e}")),
     }

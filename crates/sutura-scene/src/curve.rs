@@ -160,7 +160,7 @@ pub fn read_points(text: &str, unit: f64) -> Result<Vec<DVec3>, String> {
             line.split([',', ';', ' ', '\t']).filter(|w| !w.is_empty()).map(str::parse::<f64>).collect();
         match numbers.as_deref() {
             Ok([x, y, z]) if x.is_finite() && y.is_finite() && z.is_finite() => {
-                points.push(DVec3::new(*x, *y, *z) * unit)
+                points.push(DVec3::new(*x, *y, *z) * unit);
             }
             Ok(other) if other.len() != 3 => {
                 return Err(format!("line {}: {} numbers, wanted three", i + 1, other.len()));

@@ -186,7 +186,7 @@ impl Check {
                     worst: value,
                     worst_time: time,
                     badness,
-                })
+                });
             }
             Some(seen) => {
                 seen.min = seen.min.min(v);

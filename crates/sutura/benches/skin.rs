@@ -38,7 +38,7 @@ fn main() {
                 std::hint::black_box(&bones),
                 std::hint::black_box(&mut positions),
                 std::hint::black_box(&mut normals),
-            )
+            );
         });
         println!(
             "{elements:>8} {sides:>6} {rings:>6} {n:>9} {ms_bones:>10.4} {ms:>10.4} {:>16.4}",

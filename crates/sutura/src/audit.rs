@@ -325,7 +325,7 @@ impl Audit {
             seen[k].alive = true;
             for (rod, tree) in now.rods.iter().zip(trees.iter()) {
                 let element = |report: &mut AuditReport, e: usize| {
-                    thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose)
+                    thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
                 };
                 match &seen[k].bounds {
                     Some(bounds) => {

@@ -425,7 +425,7 @@ fn identify(summands: &[Diagram]) -> Result<(Invariants, Vec<Part>), Problem> {
         sum = sum.sum(&invariants).ok_or(Problem::TooTangled)?;
         match primes_of(&invariants, n) {
             Some(primes) => {
-                parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings() }))
+                parts.extend(primes.into_iter().map(|prime| Part { prime: Some(prime), crossings: prime.crossings() }));
             }
             None => parts.push(Part { prime: None, crossings: n }),
         }

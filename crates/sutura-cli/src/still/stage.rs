@@ -39,7 +39,7 @@ impl Stage {
             match &solid.geometry {
                 Geometry::Plane => floors.push(Floor { point: pose.position, normal: pose.orientation * DVec3::Z }),
                 Geometry::Sphere { radius } => {
-                    primitives.push((Primitive::Capsule(Capsule::new(pose.position, pose.position, *radius)), color))
+                    primitives.push((Primitive::Capsule(Capsule::new(pose.position, pose.position, *radius)), color));
                 }
                 Geometry::Capsule { radius, half_length } => {
                     let (a, b) =
@@ -50,7 +50,7 @@ impl Stage {
                     primitives.push((Primitive::Cylinder { pose, radius: *radius, half_length: *half_length }, color));
                 }
                 Geometry::Box { half_sides } => {
-                    primitives.push((Primitive::Box { pose, half_sides: *half_sides }, color))
+                    primitives.push((Primitive::Box { pose, half_sides: *half_sides }, color));
                 }
                 Geometry::Mesh { vertices, triangles } => {
                     for t in triangles {

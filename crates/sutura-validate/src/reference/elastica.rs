@@ -52,7 +52,7 @@ pub fn tip_load_shape(k: f64, n: usize) -> Vec<(f64, f64)> {
             }
             // a'' = -k cos a, with the moment at the clamp from the table of the tip.
             let y = integrate(&[0.0, clamp_curvature, 0.0, 0.0], s, |_, y, dy| {
-                dy.copy_from_slice(&[y[1], -k * y[0].cos(), y[0].cos(), y[0].sin()])
+                dy.copy_from_slice(&[y[1], -k * y[0].cos(), y[0].cos(), y[0].sin()]);
             });
             (y[2], y[3])
         })

@@ -55,7 +55,7 @@ fn across(height: f64) -> Vec<DVec3> {
 fn a_thread_drawn_through_another_in_one_state_is_found_and_a_touch_is_not() {
     let still = line(DVec3::X * -5e-3, DVec3::X * 5e-3, 33);
     let show = |audit: &mut Audit, time, height| {
-        Scene::default().with_rod(3, R, still.clone()).with_rod(5, R, across(height)).show(audit, time)
+        Scene::default().with_rod(3, R, still.clone()).with_rod(5, R, across(height)).show(audit, time);
     };
     let mut audit = Audit::new();
     show(&mut audit, 0.0, 3.0 * R);
@@ -168,7 +168,7 @@ fn a_thread_laid_on_a_shape_touches_it_and_drawn_through_is_found() {
         let over = |height: f64| line(DVec3::new(0.0, -5e-3, top + height), DVec3::new(0.0, 5e-3, top + height), 25);
         let thread = |height: f64| over(height).into_iter().map(|p| pose.transform_point(p)).collect::<Vec<_>>();
         let show = |audit: &mut Audit, time, height| {
-            Scene::default().with_rod(0, R, thread(height)).with_shape(7, geometry.clone(), pose).show(audit, time)
+            Scene::default().with_rod(0, R, thread(height)).with_shape(7, geometry.clone(), pose).show(audit, time);
         };
         let mut audit = Audit::new();
         show(&mut audit, 0.0, 8.0 * R);
@@ -245,7 +245,7 @@ fn threads_and_shapes_that_come_and_go_are_taken_up_anew() {
 fn a_state_that_is_not_finite_is_counted_and_skipped() {
     let still = line(DVec3::X * -5e-3, DVec3::X * 5e-3, 33);
     let show = |audit: &mut Audit, time, height| {
-        Scene::default().with_rod(0, R, still.clone()).with_rod(1, R, across(height)).show(audit, time)
+        Scene::default().with_rod(0, R, still.clone()).with_rod(1, R, across(height)).show(audit, time);
     };
     let mut audit = Audit::new();
     show(&mut audit, 0.0, 4.0 * R);

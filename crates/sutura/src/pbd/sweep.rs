@@ -66,7 +66,7 @@ impl Sweep {
         match order {
             SweepOrder::Natural => thread.natural(),
             SweepOrder::TwoColor => {
-                thread.two_color(&self.stretch_lanes[elements.clone()], &self.joint_lanes[elements])
+                thread.two_color(&self.stretch_lanes[elements.clone()], &self.joint_lanes[elements]);
             }
         }
     }

@@ -154,7 +154,7 @@ impl Dense {
                     }
                 }
                 Friction::Rim(y, z, turn) if have[c] & 2 == 0 => {
-                    positive &= self.push(Unknown { contact, kind: Kind::Turn(-z, y), turn })
+                    positive &= self.push(Unknown { contact, kind: Kind::Turn(-z, y), turn });
                 }
                 _ => {}
             }
@@ -236,7 +236,7 @@ impl Delassus for Dense {
             unknowns.push(Unknown { contact, kind: Kind::Component(0), turn: 0.0 });
             match set.friction[c] {
                 Friction::Inside => {
-                    unknowns.extend([1, 2].map(|a| Unknown { contact, kind: Kind::Component(a), turn: 0.0 }))
+                    unknowns.extend([1, 2].map(|a| Unknown { contact, kind: Kind::Component(a), turn: 0.0 }));
                 }
                 Friction::Rim(y, z, turn) => unknowns.push(Unknown { contact, kind: Kind::Turn(-z, y), turn }),
                 Friction::None => {}

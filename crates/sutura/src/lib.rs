@@ -4,6 +4,7 @@
 //! SI units throughout; right-handed; no up axis (gravity is a vector). Energy, tension and twist signs: tension is
 //! positive when stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
 
+mod arrays;
 pub mod audit;
 mod budget;
 mod collide;

@@ -284,40 +284,9 @@ pub(crate) fn refit(model: &mut Model, from: &State, to: &State) {
 
 /// Cuts element `e` of a rod in two of the same section, in the model; lengths are to be set.
 fn split_model(model: &mut Model, rod: u32, e: usize) {
-    let Model {
-        rods,
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        rest_half,
-        stretch_stiffness,
-        inextensible,
-        bend_stiffness,
-        bend_damping,
-        ..
-    } = model;
-    macro_rules! again {
-        ($($array:ident),*) => {$( let v = $array[e].clone(); $array.insert(e + 1, v); )*};
-    }
-    again!(
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        stretch_stiffness,
-        inextensible,
-        bend_stiffness,
-        bend_damping
-    );
-    rest_half.insert(e + 1, glam::DQuat::IDENTITY);
-    shift_model(rods, rod, e, 1);
+    model.repeat_entry(e);
+    model.rest_half[e + 1] = glam::DQuat::IDENTITY;
+    shift_model(&mut model.rods, rod, e, 1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {
             let first = model.rods.at(rod).expect("living").first;
@@ -329,40 +298,8 @@ fn split_model(model: &mut Model, rod: u32, e: usize) {
 
 /// Joins elements `e` and `e + 1` of a rod, in the model; the length is to be set.
 fn merge_model(model: &mut Model, rod: u32, e: usize) {
-    let Model {
-        rods,
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        rest_half,
-        stretch_stiffness,
-        inextensible,
-        bend_stiffness,
-        bend_damping,
-        ..
-    } = model;
-    macro_rules! without {
-        ($($array:ident),*) => {$( $array.remove(e + 1); )*};
-    }
-    without!(
-        mass,
-        rod_of,
-        rest_length,
-        factors,
-        section,
-        inertia,
-        joint_length,
-        rest_half,
-        stretch_stiffness,
-        inextensible,
-        bend_stiffness,
-        bend_damping
-    );
-    shift_model(rods, rod, e, -1);
+    model.remove_entry(e + 1);
+    shift_model(&mut model.rods, rod, e, -1);
     for (_, weld) in model.welds.iter_mut() {
         for m in weld.members.iter_mut().filter(|m| m.rod == rod) {
             let first = model.rods.at(rod).expect("living").first;
@@ -388,16 +325,10 @@ fn split_state(model: &Model, state: &mut State, reel: u32, e: usize, first: f64
     let part = first / l;
     let (x, v) =
         (state.position[e].lerp(state.position[e + 1], part), state.velocity[e].lerp(state.velocity[e + 1], part));
-    state.position.insert(e + 1, x);
-    state.velocity.insert(e + 1, v);
-    let State { orientation, angular_velocity, tension, plastic, hardened, rest_length, .. } = &mut *state;
-    orientation.insert(e + 1, orientation[e]);
-    angular_velocity.insert(e + 1, angular_velocity[e]);
-    tension.insert(e + 1, tension[e]);
-    plastic.insert(e + 1, glam::DVec3::ZERO);
-    hardened.insert(e + 1, 0.0);
-    rest_length.insert(e + 1, l - first);
-    rest_length[e] = first;
+    state.repeat_entry(e);
+    (state.position[e + 1], state.velocity[e + 1]) = (x, v);
+    (state.plastic[e + 1], state.hardened[e + 1]) = (glam::DVec3::ZERO, 0.0);
+    (state.rest_length[e], state.rest_length[e + 1]) = (first, l - first);
     let place = |k: u32, s: f64| match (k as usize).cmp(&e) {
         core::cmp::Ordering::Less => (k, s),
         // Of a part too small to be told from none it is the end.
@@ -412,18 +343,11 @@ fn split_state(model: &Model, state: &mut State, reel: u32, e: usize, first: f64
 fn merge_state(model: &Model, state: &mut State, reel: u32, e: usize, at_end: bool) {
     let (a, b) = (model.rest_length[e], model.rest_length[e + 1]);
     let keep = if at_end { e } else { e + 1 };
-    let State { position, velocity, orientation, angular_velocity, tension, plastic, hardened, rest_length, .. } =
-        &mut *state;
-    position.remove(e + 1);
-    velocity.remove(e + 1);
-    (orientation[e], angular_velocity[e], tension[e]) = (orientation[keep], angular_velocity[keep], tension[keep]);
-    rest_length[e] = a + b;
-    orientation.remove(e + 1);
-    angular_velocity.remove(e + 1);
-    tension.remove(e + 1);
-    plastic.remove(e + 1);
-    hardened.remove(e + 1);
-    rest_length.remove(e + 1);
+    state.orientation[e] = state.orientation[keep];
+    state.angular_velocity[e] = state.angular_velocity[keep];
+    state.tension[e] = state.tension[keep];
+    state.rest_length[e] = a + b;
+    state.remove_entry(e + 1);
     let part = a / (a + b);
     let place = |k: u32, s: f64| match k as usize {
         k if k == e => (k as u32, s * part),

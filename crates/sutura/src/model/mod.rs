@@ -10,6 +10,7 @@ pub mod section;
 pub mod shape;
 pub mod weld;
 
+use crate::arrays::element_arrays;
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
 use glam::{DQuat, DVec3};
@@ -69,6 +70,21 @@ pub struct Model {
     /// Relaxation time of Kelvin-Voigt damping of each joint \[s\].
     pub(crate) bend_damping: Vec<f64>,
 }
+
+element_arrays!(Model {
+    mass,
+    rod_of,
+    rest_length,
+    factors,
+    section,
+    inertia,
+    joint_length,
+    rest_half,
+    stretch_stiffness,
+    inextensible,
+    bend_stiffness,
+    bend_damping,
+});
 
 /// Slots of threads and shapes that were put somewhere, not moved there.
 #[derive(Debug, Default)]

@@ -1,5 +1,6 @@
 //! What a snapshot must hold: everything that the next step depends on and the user did not give as `Model`.
 
+use crate::arrays::element_arrays;
 use crate::handle::Slots;
 use crate::math::Pose;
 pub(crate) use crate::model::grip::LoadState;
@@ -62,6 +63,9 @@ pub struct State {
     pub(crate) thread_contacts: Vec<ThreadContact>,
     pub(crate) shape_contacts: Vec<ShapeContact>,
 }
+
+// Accelerations have as many entries, or none where they are not known.
+element_arrays!(State { rest_length, position, velocity, orientation, angular_velocity, tension, plastic, hardened });
 
 /// States to go back to, one per halving depth.
 #[derive(Default)]

@@ -1,0 +1,107 @@
+//! Shapes: put in, moved, read.
+
+use super::{SHAPE, World, Wrench};
+use crate::error::Error;
+use crate::handle::Handle;
+use crate::math::Pose;
+use crate::model::ShapeModel;
+use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
+use crate::state::Onset;
+use crate::view::ShapeView;
+
+impl World {
+    /// Adds a shape.
+    pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
+        let Checked { geometry, closed, container, notes } = spec.check()?;
+        let collider = crate::model::collider::Collider::new(&geometry)?;
+        let hash = crate::snapshot::hash_of(&geometry);
+        let shape = ShapeModel {
+            geometry,
+            hash,
+            collider,
+            surface: spec.surface,
+            motion: spec.motion,
+            closed,
+            container,
+            notes,
+        };
+        let handle: Handle<Shape> = self.model.shapes.insert(shape);
+        self.model.placed.shapes.push(handle.index);
+        let n = self.model.shapes.len();
+        self.state.shape_pose.resize(n, Pose::IDENTITY);
+        self.state.shape_target.resize(n, Pose::IDENTITY);
+        let pose = Pose::new(spec.pose.position, spec.pose.orientation.normalize());
+        self.state.shape_pose[handle.index()] = pose;
+        self.state.shape_target[handle.index()] = pose;
+        Ok(handle)
+    }
+
+    /// Removes a shape.
+    pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
+        self.model.shapes.remove(shape).ok_or(SHAPE)?;
+        self.state.interrupt(Onset::Unknown);
+        self.state.shape_contacts.retain(|c| c.shape != shape.index);
+        Ok(())
+    }
+
+    /// Pose wanted at the end of the next step for a driven shape. It gets there at constant rate.
+    pub fn set_shape_pose(&mut self, shape: Handle<Shape>, pose: Pose) -> Result<(), Error> {
+        let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
+        if s.motion != ShapeMotion::Driven {
+            return Err(Error::invalid("shape", "motion", s.motion, "Driven, for a pose to be set"));
+        }
+        if !pose.is_valid() {
+            return Err(Error::invalid("shape", "pose", pose, "finite, with a unit quaternion"));
+        }
+        self.state.shape_target[shape.index()] = pose;
+        Ok(())
+    }
+
+    /// Changes what moves a shape (for instance the force on a pushed one), from the next step on.
+    pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
+        motion.validate()?;
+        self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
+        self.state.interrupt(Onset::Unknown);
+        self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
+        Ok(())
+    }
+
+    /// Force with which threads act on a shape, at the last accepted substep, torque about its origin.
+    pub fn shape_wrench(&self, shape: Handle<Shape>) -> Result<Wrench, Error> {
+        self.model.shapes.get(shape).ok_or(SHAPE)?;
+        let origin = self.state.shape_pose[shape.index()].position;
+        let mut sum = Wrench::default();
+        for c in self.state.shape_contacts.iter().filter(|c| c.shape == shape.index) {
+            let e = c.element as usize;
+            let x = self.state.position[e].lerp(self.state.position[e + 1], c.s);
+            let surface = x - c.normal * self.radius_of(e);
+            let force = -(c.normal * c.normal_force + c.friction);
+            sum.force += force;
+            sum.torque += (surface - origin).cross(force);
+        }
+        Ok(sum)
+    }
+
+    /// Reads a shape.
+    pub fn shape(&self, shape: Handle<Shape>) -> Result<ShapeView<'_>, Error> {
+        let s = self.model.shapes.get(shape).ok_or(SHAPE)?;
+        Ok(ShapeView {
+            geometry: &s.geometry,
+            pose: self.state.shape_pose[shape.index()],
+            motion: s.motion,
+            surface: s.surface,
+            slot: shape.index(),
+        })
+    }
+
+    /// What was mended of a mesh when it was inserted, and what may not have been meant: that it is open and where,
+    /// that it is a container. Each is a sentence without its full stop.
+    pub fn shape_notes(&self, shape: Handle<Shape>) -> Result<&[String], Error> {
+        Ok(&self.model.shapes.get(shape).ok_or(SHAPE)?.notes)
+    }
+
+    /// Whether a shape has an inside: all but open meshes.
+    pub fn shape_is_closed(&self, shape: Handle<Shape>) -> Result<bool, Error> {
+        Ok(self.model.shapes.get(shape).ok_or(SHAPE)?.closed)
+    }
+}

@@ -128,7 +128,8 @@ struct Touch {
 /// Those of the present.
 fn touches_now(world: &Engine) -> Vec<Touch> {
     let touch = |c: ContactView| {
-        let radius = world.view().rods().find(|r| r.slot() == c.a.0)?.radius();
+        let (slot, ..) = c.a.thread()?;
+        let radius = world.view().rods().find(|r| r.slot() == slot)?.radius();
         Some(Touch { at: c.point - c.normal * radius, normal: c.normal, force: c.force, sliding: c.sliding, radius })
     };
     world.contacts().filter_map(touch).collect()

@@ -1,7 +1,7 @@
 //! Everything that can be read of a world, and whether it is finite. An error names what is not.
 
 use sutura::glam::{DQuat, DVec3};
-use sutura::{ContactWith, StepReport, View, World};
+use sutura::{ContactSide, StepReport, View, World};
 
 /// Nothing, or what is wrong.
 pub type Found = Result<(), String>;
@@ -62,9 +62,8 @@ pub fn readings(world: &World) -> Found {
     }
     for contact in world.contacts() {
         all("contact", &[contact.point, contact.normal, contact.force])?;
-        one("place of a contact", contact.s)?;
-        if let ContactWith::Thread(_, _, t) = contact.b {
-            one("place of a contact", t)?;
+        for (_, _, s) in [contact.a, contact.b].iter().filter_map(ContactSide::thread) {
+            one("place of a contact", s)?;
         }
     }
     Ok(())

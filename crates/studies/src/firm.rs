@@ -9,8 +9,8 @@ use std::time::Duration;
 use sutura::audit::Audit;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    ContactWith, Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose,
-    Rod, RodSpec, Settings, ShapeMotion, ShapeSpec, Shear, World,
+    Drive, Friction, Geometry, Grip, GripSpec, Handle, Hold, LoadKind, LoadSpec, Material, Place, Pose, Rod, RodSpec,
+    Settings, ShapeMotion, ShapeSpec, Shear, World,
 };
 use sutura_scene::presets::{find_material, find_size, knot_pull};
 
@@ -221,7 +221,7 @@ impl<'a> Run<'a> {
     fn largest(&self) -> [f64; 2] {
         let mut most = [0.0_f64; 2];
         for c in self.s.world.contacts() {
-            let k = usize::from(matches!(c.b, ContactWith::Shape(_)));
+            let k = usize::from(c.b.shape().is_some());
             most[k] = most[k].max(c.force.dot(c.normal));
         }
         most
@@ -366,8 +366,7 @@ fn crossed(
     })?;
     let ended = run.wait(1.0);
     run.rests(None);
-    let pressed: f64 =
-        run.s.world.contacts().filter(|c| matches!(c.b, ContactWith::Thread(..))).map(|c| c.force.z.abs()).sum();
+    let pressed: f64 = run.s.world.contacts().filter(|c| c.b.thread().is_some()).map(|c| c.force.z.abs()).sum();
     // Several rows share it.
     run.row.hertz[0] = Some(run.thread.crossed(pressed));
     run.row.force = format!("{pressed:.3} of {force} N");

@@ -6,8 +6,8 @@ use anyhow::Context as _;
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::Path;
-use sutura::World;
 use sutura::input::{Input, Recording};
+use sutura::{ContactSide, World};
 
 /// Runs the command; false when something differs.
 pub fn replay(args: &Replay) -> anyhow::Result<bool> {
@@ -119,13 +119,13 @@ fn numbers(world: &World) -> String {
         put(&format!("shape {} position", shape.slot), 0, &shape.pose.position.to_array());
         put(&format!("shape {} orientation", shape.slot), 0, &shape.pose.orientation.to_array());
     }
+    let side = |side: &ContactSide| match *side {
+        ContactSide::Thread { rod, element, s } => format!("thread {rod} element {element} place {s}"),
+        ContactSide::Shape { shape } => format!("shape {shape}"),
+        _ => "another".to_owned(),
+    };
     for (i, contact) in world.contacts().enumerate() {
-        put(
-            &format!("contact of thread {} element {} with {:?}", contact.a.0, contact.a.1, contact.b)
-                .replace(',', ";"),
-            i,
-            &contact.force.to_array(),
-        );
+        put(&format!("contact of {} with {}", side(&contact.a), side(&contact.b)), i, &contact.force.to_array());
     }
     out
 }

@@ -14,7 +14,7 @@ use crate::trajectory::{Frame, Header, Thread, refit};
 use std::path::{Path, PathBuf};
 use sutura::glam::{DQuat, DVec3};
 use sutura::skin::{Skin, SkinSpec, TriangleMesh, shape_mesh};
-use sutura::{ContactWith, Geometry, Pose, Profile};
+use sutura::{Geometry, Pose, Profile};
 
 /// Colors of threads, one after the other (sRGB), chosen to be told apart also by the color-blind (after Okabe and Ito
 /// 2008, darkened a little).
@@ -407,9 +407,10 @@ impl Moment {
             }
         };
         for contact in runner.world().contacts() {
-            push(contact.a.0, contact.a.1, contact.s, contact.force);
-            if let ContactWith::Thread(slot, element, s) = contact.b {
-                push(slot, element, s, -contact.force);
+            for (side, force) in [(contact.a, contact.force), (contact.b, -contact.force)] {
+                if let Some((slot, element, s)) = side.thread() {
+                    push(slot, element, s, force);
+                }
             }
         }
         moment

@@ -21,7 +21,7 @@ use std::mem::discriminant;
 use std::time::Duration;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::{Recorder, Recording};
-use sutura::{ContactWith, Grip, Handle, Incident, IncidentKind, Overlap, OverlapWith, Pose, Rod, RodView, World};
+use sutura::{Grip, Handle, Incident, IncidentKind, Overlap, OverlapWith, Pose, Rod, RodView, World};
 
 /// A scene being run.
 pub struct Runner {
@@ -864,16 +864,16 @@ impl Runner {
         // Things of the scene alone are in its world, so each has its number.
         let thread = |slot: usize| stage.threads.iter().position(|h| h.index() == slot).map(|i| i as u32);
         let shape = |slot: usize| stage.shapes.iter().position(|h| h.index() == slot).map(|i| i as u32);
-        let on = |slot: usize, element: usize, s: f64| {
+        let on = |(slot, element, s): (usize, usize, f64)| {
             Some(OnThread { thread: thread(slot)?, element: element as u32, s: s as f32 })
         };
         let contact = |c: sutura::ContactView| {
-            let with = match c.b {
-                ContactWith::Thread(slot, element, s) => Touched::Thread(on(slot, element, s)?),
-                ContactWith::Shape(slot) => Touched::Shape(shape(slot)?),
+            let with = match c.b.thread() {
+                Some(place) => Touched::Thread(on(place)?),
+                None => Touched::Shape(shape(c.b.shape()?)?),
             };
             Some(Contact {
-                on: on(c.a.0, c.a.1, c.s)?,
+                on: on(c.a.thread()?)?,
                 with,
                 point: v(c.point),
                 normal: v(c.normal),

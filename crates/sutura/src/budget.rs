@@ -23,7 +23,7 @@ use crate::model::shape::ShapeMotion;
 use crate::motion::Motion;
 use crate::params::{Integrator, OVERLAP};
 use crate::rod::length::LENGTH_TOLERANCE;
-use crate::state::State;
+use crate::state::{Contact, State};
 use glam::{DMat3, DVec3};
 
 /// Rounding of an energy, over the energies that it is summed of: some hundred terms of some rounded numbers each.
@@ -161,8 +161,9 @@ impl Budget {
         self.of.extend(0..n as u32);
         self.groups.clear();
         self.groups.resize(n, Group { held: false, gripped: false, touched: false, driven: false, twisted: false });
-        for c in before.thread_contacts.iter().chain(&state.thread_contacts) {
-            self.join(model.rod_of[c.a as usize], model.rod_of[c.b as usize]);
+        let contacts = || before.contacts.iter().chain(state.contacts.iter());
+        for (a, b) in contacts().filter_map(Contact::elements) {
+            self.join(model.rod_of[a as usize], model.rod_of[b as usize]);
         }
         for (_, weld) in model.welds.iter() {
             for member in &weld.members[1..] {
@@ -184,14 +185,13 @@ impl Budget {
         for (_, reel) in state.reels.iter() {
             self.groups[self.of[reel.rod as usize] as usize].driven = true;
         }
-        for c in before.thread_contacts.iter().chain(&state.thread_contacts) {
-            self.groups[self.of[model.rod_of[c.a as usize] as usize] as usize].touched = true;
-        }
-        for c in before.shape_contacts.iter().chain(&state.shape_contacts) {
-            let group = &mut self.groups[self.of[model.rod_of[c.element as usize] as usize] as usize];
+        for c in contacts() {
+            let Some((element, _)) = c.a.thread() else { continue };
+            let group = &mut self.groups[self.of[model.rod_of[element as usize] as usize] as usize];
             group.touched = true;
-            let k = c.shape as usize;
-            let pushed = model.shapes.at(c.shape).is_some_and(|s| matches!(s.motion, ShapeMotion::Pushed { .. }));
+            let Some(shape) = c.b.shape() else { continue };
+            let k = shape as usize;
+            let pushed = model.shapes.at(shape).is_some_and(|s| matches!(s.motion, ShapeMotion::Pushed { .. }));
             group.held = true;
             group.driven |= pushed || state.shape_pose[k] != before.shape_pose[k];
         }
@@ -330,8 +330,8 @@ fn slack<'a, I: Iterator<Item = &'a RodModel> + Clone>(
     for rod in rods() {
         let own = |e: u32| rod.particles().contains(&(e as usize));
         let of = |s: &State| {
-            let threads = s.thread_contacts.iter().filter(|c| own(c.a)).map(|c| 2.0 * c.normal_force).sum::<f64>();
-            threads + s.shape_contacts.iter().filter(|c| own(c.element)).map(|c| c.normal_force).sum::<f64>()
+            let own = s.contacts.iter().filter(|c| c.a.thread().is_some_and(|(element, _)| own(element)));
+            own.map(|c| if c.b.shape().is_some() { c.normal_force } else { 2.0 * c.normal_force }).sum::<f64>()
         };
         sum += of(before).max(of(state)) * rod.radius * 2.0 * OVERLAP;
     }

@@ -11,17 +11,19 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
     let grips =
         state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
     let shapes = model.shapes.iter().all(|(k, _)| state.shape_pose[k as usize].is_valid());
-    let threads = state.thread_contacts.iter().all(|c| (c.normal * c.normal_force + c.friction).is_finite());
+    let threads = state.contacts.threads().iter().all(|c| c.force().is_finite());
     // What threads do to a shape is read as a sum.
     let on_shapes: DVec3 = state
-        .shape_contacts
+        .contacts
+        .shapes()
         .iter()
-        .map(|c| {
-            let radius = model.rods.at(model.rod_of[c.element as usize]).map_or(0.0, |r| r.radius);
-            let at = state.position[c.element as usize].lerp(state.position[c.element as usize + 1], c.s);
-            let arm = at - c.normal * radius - state.shape_pose[c.shape as usize].position;
-            let force = c.normal * c.normal_force + c.friction;
-            force.abs() + arm.cross(force).abs()
+        .filter_map(|c| {
+            let (element, s) = c.a.thread()?;
+            let e = element as usize;
+            let radius = model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius);
+            let at = state.position[e].lerp(state.position[e + 1], s);
+            let arm = at - c.normal * radius - state.shape_pose[c.b.shape()? as usize].position;
+            Some(c.force().abs() + arm.cross(c.force()).abs())
         })
         .sum();
     grips && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)

@@ -18,7 +18,7 @@ use crate::model::Model;
 use crate::motion::Motion;
 use crate::params::Integrator;
 use crate::rod::strain;
-use crate::state::{Onset, State};
+use crate::state::{Contact, Onset, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use core::ops::Range;
 use glam::DVec3;
@@ -279,13 +279,8 @@ pub(crate) fn spins(model: &Model, origin: &State, state: &State, h: f64, e: usi
 
 /// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round.
 pub(crate) fn touches_anew(before: &State, now: &State) -> bool {
-    fn threads(s: &State) -> impl Iterator<Item = (u32, u32, bool)> + '_ {
-        s.thread_contacts.iter().map(|c| (c.a, c.b, c.sliding))
-    }
-    fn shapes(s: &State) -> impl Iterator<Item = (u32, u32, bool)> + '_ {
-        s.shape_contacts.iter().map(|c| (c.shape, c.element, c.sliding))
-    }
-    !threads(before).eq(threads(now)) || !shapes(before).eq(shapes(now))
+    let pieces = |c: &Contact| (c.a.piece(), c.b.piece(), c.sliding);
+    !before.contacts.iter().map(pieces).eq(now.contacts.iter().map(pieces))
 }
 
 #[cfg(test)]

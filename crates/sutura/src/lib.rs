@@ -54,5 +54,5 @@ pub use model::weld::{Weld, WeldRest, WeldSpec};
 pub use params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrder};
 pub use report::{Incident, IncidentKind, Rejection, StepReport};
 pub use rod::energy::Energy;
-pub use view::{ContactView, ContactWith, RodView, ShapeView, View, WeldView};
+pub use view::{ContactSide, ContactView, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

@@ -236,6 +236,12 @@ pub(crate) const FRONT: u32 = 3;
 /// Slip in a substep beyond which a contact counts as sliding and its kinetic friction holds, in radii. What slips less
 /// evens out forces between contacts that together hold.
 pub(crate) const SLIP: f64 = 1e-3;
+/// Part of the friction limit from which a friction force is taken to be at it.
+pub(crate) const AT_LIMIT: f64 = 0.9999;
+
+/// Most slip that the next substep is left to undo, in radii.
+pub(crate) const DRIFT_MOST: f64 = 0.1;
+
 /// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two
 /// factorizations. (One that is cut short has friction that does not hold yet: in a rope of threads that feeds itself
 /// from substep to substep.)

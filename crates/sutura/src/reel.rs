@@ -7,7 +7,7 @@ use crate::model::grip::{Hold, Place};
 use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::rod::brake::Brake;
-use crate::state::{LoadState, ReelState, ShapeContact, State, ThreadContact};
+use crate::state::{LoadState, ReelState, Site, State};
 
 /// Lengths of the last element, over its length when the reel was set up, beyond which it is cut and below which it is
 /// joined with the next.
@@ -382,21 +382,19 @@ fn renumber_state(
             *k = moved(*k);
         }
     }
-    for c in &mut state.thread_contacts {
-        ((c.a, c.s), (c.b, c.t)) = (place(c.a, c.s), place(c.b, c.t));
-    }
-    for c in &mut state.shape_contacts {
-        (c.element, c.s) = place(c.element, c.s);
-    }
-    // One of an element with itself is none.
-    state.thread_contacts.retain(|c| c.a < c.b);
-    ThreadContact::sort(&mut state.thread_contacts);
-    ShapeContact::sort(&mut state.shape_contacts);
+    state.contacts.rename(|site| match site {
+        Site::Thread { element, s } => {
+            let (element, s) = place(element, s);
+            Site::Thread { element, s }
+        }
+        Site::Shape { .. } => site,
+    });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::state::Contact;
     use crate::{LoadKind, LoadSpec, Material, ReelSpec, RodSpec, Settings, World};
     use glam::DVec3;
 
@@ -448,34 +446,25 @@ mod tests {
             .unwrap();
         world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.0), supply: None }).unwrap();
         let (mut model, mut state) = world.into_parts();
-        let contact = |element: u32, s: f64| ShapeContact {
-            shape: 0,
-            element,
-            s,
-            normal: DVec3::Z,
-            normal_force: 1.0,
-            friction: DVec3::ZERO,
-            drift: DVec3::ZERO,
-            sliding: false,
-        };
-        // Of a shape 1 they come after all of a shape 0.
-        state.shape_contacts =
-            vec![contact(0, 0.2), contact(0, 0.9), contact(1, 0.1), ShapeContact { shape: 1, ..contact(0, 0.3) }];
-        let pair = |a: u32, s: f64, b: u32| ThreadContact {
+        let contact = |a: Site, b: Site| Contact {
             a,
             b,
-            s,
-            t: 0.5,
             normal: DVec3::Z,
             normal_force: 1.0,
             friction: DVec3::ZERO,
             drift: DVec3::ZERO,
             sliding: false,
         };
-        state.thread_contacts = vec![pair(0, 0.9, 5), pair(0, 0.1, 6), pair(1, 0.5, 5)];
+        let place = |element: u32, s: f64| Site::Thread { element, s };
+        let on = |element: u32, s: f64, shape: u32| contact(place(element, s), Site::Shape { shape });
+        let pair = |a: u32, s: f64, b: u32| contact(place(a, s), place(b, 0.5));
+        // Of a shape 1 they come after all of a shape 0.
+        let shapes = [on(0, 0.2, 0), on(0, 0.9, 0), on(1, 0.1, 0), on(0, 0.3, 1)];
+        state.contacts.set(shapes.into_iter().chain([pair(0, 0.9, 5), pair(0, 0.1, 6), pair(1, 0.5, 5)]));
         let in_order = |state: &State| {
-            assert!(state.shape_contacts.is_sorted_by_key(|c| (c.shape, c.element)), "{:?}", state.shape_contacts);
-            assert!(state.thread_contacts.is_sorted_by_key(|c| (c.a, c.b)), "{:?}", state.thread_contacts);
+            let (threads, shapes) = (state.contacts.threads(), state.contacts.shapes());
+            assert!(threads.is_sorted_by_key(|c| c.elements().unwrap()), "{threads:?}");
+            assert!(shapes.is_sorted_by_key(|c| c.on_shape().unwrap()), "{shapes:?}");
         };
         state.rest_length[0] *= 1.7;
         follow(&mut model, &state);
@@ -485,6 +474,7 @@ mod tests {
         follow(&mut model, &state);
         assert!(renumber(&mut model, &mut state, 1e-3));
         in_order(&state);
-        assert_eq!(state.thread_contacts.iter().map(|c| (c.a, c.b)).collect::<Vec<_>>(), [(0, 5), (0, 6), (1, 5)]);
+        let pairs: Vec<_> = state.contacts.threads().iter().filter_map(Contact::elements).collect();
+        assert_eq!(pairs, [(0, 5), (0, 6), (1, 5)]);
     }
 }

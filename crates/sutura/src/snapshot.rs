@@ -8,7 +8,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{GripState, LoadState, Onset, ReelState, ShapeContact, State, ThreadContact};
+use crate::state::{Contact, Contacts, GripState, LoadState, Onset, ReelState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
@@ -192,8 +192,6 @@ variants!(LoadKind {
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
-structure!(ThreadContact { a, b, s, t, normal, normal_force, friction, drift, sliding });
-structure!(ShapeContact { shape, element, s, normal, normal_force, friction, drift, sliding });
 structure!(GripState {
     rod,
     index,
@@ -232,9 +230,53 @@ structure!(State {
     grips,
     loads,
     reels,
-    thread_contacts,
-    shape_contacts,
+    contacts,
 });
+
+/// Contacts of threads with threads, and those with shapes, each with its count.
+impl Bytes for Contacts {
+    fn put(&self, out: &mut Vec<u8>) {
+        let rest = |c: &Contact, out: &mut Vec<u8>| {
+            (c.normal, c.normal_force).put(out);
+            (c.friction, c.drift).put(out);
+            c.sliding.put(out);
+        };
+        (self.threads().len() as u64).put(out);
+        for c in self.threads() {
+            if let (Site::Thread { element: a, s }, Site::Thread { element: b, s: t }) = (c.a, c.b) {
+                ((a, b), (s, t)).put(out);
+            }
+            rest(c, out);
+        }
+        (self.shapes().len() as u64).put(out);
+        for c in self.shapes() {
+            if let (Site::Thread { element, s }, Site::Shape { shape }) = (c.a, c.b) {
+                ((shape, element), s).put(out);
+            }
+            rest(c, out);
+        }
+    }
+    fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
+        type Rest = ((DVec3, f64), ((DVec3, DVec3), bool));
+        let contact = |a: Site, b: Site, ((normal, normal_force), ((friction, drift), sliding)): Rest| Contact {
+            a,
+            b,
+            normal,
+            normal_force,
+            friction,
+            drift,
+            sliding,
+        };
+        let threads = Vec::<(((u32, u32), (f64, f64)), Rest)>::take(input)?;
+        let shapes = Vec::<(((u32, u32), f64), Rest)>::take(input)?;
+        let thread = |element: u32, s: f64| Site::Thread { element, s };
+        let threads = threads.into_iter().map(|(((a, b), (s, t)), rest)| contact(thread(a, s), thread(b, t), rest));
+        let on = |(((shape, element), s), rest)| contact(thread(element, s), Site::Shape { shape }, rest);
+        let mut contacts = Contacts::default();
+        contacts.set(threads.chain(shapes.into_iter().map(on)));
+        Ok(contacts)
+    }
+}
 
 structure!(Build { materials, rods, shapes, welds });
 structure!(BuiltRod { slot, n_elements, radius, closed, section, along, rest });

@@ -9,7 +9,7 @@ use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::rod::energy::{Energy, energy};
-use crate::state::State;
+use crate::state::{Site, State};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -66,14 +66,13 @@ impl<'a> WeldView<'a> {
 
 /// A contact that carries force.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ContactView {
-    /// Slot of the thread and element on it.
-    pub a: (usize, usize),
-    /// What it touches.
-    pub b: ContactWith,
-    /// Where on the element, 0 at its first particle, 1 at its second.
-    pub s: f64,
-    /// World point on the centerline of `a` \[m\].
+    /// The side that the normal points to. Where a thread touches a shape it is the thread.
+    pub a: ContactSide,
+    /// The other side.
+    pub b: ContactSide,
+    /// World point of `a` \[m\]; on a thread it is on the centerline.
     pub point: DVec3,
     /// Unit normal, from `b` toward `a`.
     pub normal: DVec3,
@@ -83,13 +82,35 @@ pub struct ContactView {
     pub sliding: bool,
 }
 
-/// The other side of a contact.
+/// What touches, and where.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ContactWith {
-    /// Thread slot, element and place on it.
-    Thread(usize, usize, f64),
-    /// Shape slot.
-    Shape(usize),
+#[non_exhaustive]
+pub enum ContactSide {
+    /// A place on a thread.
+    Thread {
+        /// Slot of the thread ([`Handle::index`](crate::Handle::index)).
+        rod: usize,
+        /// Element of the thread.
+        element: usize,
+        /// Where on the element, 0 at its first particle, 1 at its second.
+        s: f64,
+    },
+    /// A shape.
+    Shape {
+        /// Slot of the shape ([`Handle::index`](crate::Handle::index)).
+        shape: usize,
+    },
+}
+
+impl ContactSide {
+    /// Slot of the thread, element and place on it, where it is one.
+    pub fn thread(&self) -> Option<(usize, usize, f64)> {
+        if let ContactSide::Thread { rod, element, s } = *self { Some((rod, element, s)) } else { None }
+    }
+    /// Slot of the shape, where it is one.
+    pub fn shape(&self) -> Option<usize> {
+        if let ContactSide::Shape { shape } = *self { Some(shape) } else { None }
+    }
 }
 
 impl<'a> View<'a> {
@@ -119,6 +140,33 @@ impl<'a> View<'a> {
         model.welds.iter().map(move |(slot, weld)| {
             let position = state.position[weld.members[0].index(model)];
             WeldView { weld, pose: Pose::new(position, state.weld_orientation[slot as usize]), slot: slot as usize }
+        })
+    }
+    /// Contacts that carry force: those of threads with threads, then those with shapes.
+    pub fn contacts(&self) -> impl Iterator<Item = ContactView> + use<'a> {
+        let (model, state) = (self.model, self.state);
+        let side = move |site: Site| match site {
+            Site::Thread { element, s } => {
+                let rod = model.rod_of[element as usize];
+                let first = model.rods.at(rod).map_or(0, |r| r.first);
+                ContactSide::Thread { rod: rod as usize, element: (element - first) as usize, s }
+            }
+            Site::Shape { shape } => ContactSide::Shape { shape: shape as usize },
+        };
+        let point = move |site: Site| match site {
+            Site::Thread { element, s } => {
+                let e = element as usize;
+                state.position[e].lerp(state.position[e + 1], s)
+            }
+            Site::Shape { shape } => state.shape_pose[shape as usize].position,
+        };
+        state.contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| ContactView {
+            a: side(c.a),
+            b: side(c.b),
+            point: point(c.a),
+            normal: c.normal,
+            force: c.force(),
+            sliding: c.sliding,
         })
     }
     pub(crate) fn rod_at(&self, slot: u32) -> Option<RodView<'a>> {

@@ -5,7 +5,7 @@ mod support;
 use support::t1;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    ContactWith, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, Shape,
+    ContactSide, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, Rod, RodSpec, Settings, Shape,
     ShapeSpec, World,
 };
 
@@ -93,7 +93,7 @@ impl Incline {
     fn carried(&self) -> (usize, f64, f64) {
         let (mut count, mut normal, mut up) = (0, 0.0, 0.0);
         for c in self.world.contacts() {
-            assert_eq!(c.b, ContactWith::Shape(self.plane.index()));
+            assert_eq!(c.b, ContactSide::Shape { shape: self.plane.index() });
             count += 1;
             normal += c.force.dot(self.out) / self.weight;
             up -= c.force.dot(self.down) / self.weight;

@@ -264,8 +264,7 @@ fn leave_rates(model: &Model, state: &mut State, motion: &motion::Motion, h: f64
         }
     }
     state.tension.fill(0.0);
-    state.thread_contacts.clear();
-    state.shape_contacts.clear();
+    state.contacts.clear();
     for (_, grip) in state.grips.iter_mut() {
         (grip.force, grip.torque) = (DVec3::ZERO, DVec3::ZERO);
     }

@@ -84,6 +84,8 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
 
 /// Leaves the contacts in the state, for the next substep to start from.
 pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mut Rows) {
-    thread::store(state, motion, rows);
-    shape::store(model, state, motion, rows);
+    let mut contacts = core::mem::take(&mut state.contacts);
+    let threads = thread::contacts(state, motion, &rows.threads);
+    contacts.set(threads.chain(shape::contacts(model, state, motion, &mut rows.shapes)));
+    state.contacts = contacts;
 }

@@ -34,7 +34,7 @@ use crate::row::Rows;
 use crate::row::border::Border;
 use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::row::pushed::Sliders;
-use crate::state::{ShapeContact, State};
+use crate::state::{Contact, Site, State};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 
@@ -145,7 +145,7 @@ impl ShapeRow {
     }
 
     /// Takes over an old contact.
-    fn receive(&mut self, c: &ShapeContact) {
+    fn receive(&mut self, c: &Contact) {
         let across = |v: DVec3| v - self.normal * self.normal.dot(v);
         self.sliding |= c.sliding;
         self.drift = across(c.drift);
@@ -213,7 +213,7 @@ impl ShapeRow {
 }
 
 /// What the rows of one element on one shape have in common.
-struct Site<'a> {
+struct Pair<'a> {
     model: &'a Model,
     slot: u32,
     element: usize,
@@ -225,7 +225,7 @@ struct Site<'a> {
     pose: &'a Pose,
 }
 
-impl Site<'_> {
+impl Pair<'_> {
     fn shape(&self) -> &ShapeModel {
         self.model.shapes.at(self.slot).expect("candidate shapes live")
     }
@@ -327,11 +327,11 @@ pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &
             _ => DVec3::ZERO,
         };
         let (start_pose, pose) = (&start_shape_pose[k], &state.shape_pose[k]);
-        let site = Site { model, slot: *slot, element: e, pushed, start, start_pose, now: x, pose };
+        let pair = Pair { model, slot: *slot, element: e, pushed, start, start_pose, now: x, pose };
         let reach = radius * (1.0 + params::REACH);
         // Neighboring elements share a particle.
-        let first = last.take().filter(|(at, _)| *at == (*slot, e)).map_or_else(|| site.look(0.0), |(_, seen)| seen);
-        let second = site.look(1.0);
+        let first = last.take().filter(|(at, _)| *at == (*slot, e)).map_or_else(|| pair.look(0.0), |(_, seen)| seen);
+        let second = pair.look(1.0);
         last = Some(((*slot, e + 1), second));
         let nearer = |(before, now): (Distance, Distance)| before.value.min(now.value);
         let (d0, d1) = (nearer(first), nearer(second));
@@ -341,7 +341,7 @@ pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &
         }
         let mut add = |s: f64, before: Distance, now: Distance| {
             if before.value.min(now.value) <= reach {
-                rows.push(site.row(s, before, now));
+                rows.push(pair.row(s, before, now));
             }
         };
         // At a particle, against all walls of a mesh that it may touch.
@@ -378,15 +378,15 @@ pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &
                 .least_between(next, next.map(|p| shape.collider.distance_local(p)), below, |s, d| between(s, d.value));
         }
         for s in &places[..count] {
-            let seen = site.look(*s);
-            let kept = keep_place(&state.shape_contacts, &site, *s, nearer(seen), length, radius);
-            let (before, now) = if kept == *s { seen } else { site.look(kept) };
+            let seen = pair.look(*s);
+            let kept = keep_place(state.contacts.shapes(), &pair, *s, nearer(seen), length, radius);
+            let (before, now) = if kept == *s { seen } else { pair.look(kept) };
             add(kept, before, now);
         }
     }
     rows.sort_unstable_by(|a, b| a.key().partial_cmp(&b.key()).expect("places are numbers"));
     leave_to_edges(rows, start);
-    inherit(&state.shape_contacts, model, rows);
+    inherit(state.contacts.shapes(), model, rows);
     merge(rows);
 }
 
@@ -406,13 +406,13 @@ fn bulges(ends: [f64; 2], s: f64, value: f64, length: f64, radius: f64) -> bool 
 /// place `s`, whose distance is `value`. The nearest place on a flat surface runs along the element with the least
 /// tilt, and a row that follows it makes the element rock: it would tilt back by as much in the next substep. On an
 /// edge it stays where it is while the thread is drawn over it, and the row has to follow.
-fn keep_place(old: &[ShapeContact], site: &Site<'_>, s: f64, value: f64, length: f64, radius: f64) -> f64 {
-    let place = |c: &ShapeContact| (c.shape, c.element as usize);
-    let from = old.partition_point(|c| place(c) < (site.slot, site.element));
-    let near =
-        old[from..].iter().take_while(|c| place(c) == (site.slot, site.element)).filter(|c| c.s > 0.0 && c.s < 1.0);
-    let Some(last) = near.map(|c| c.s).min_by(|a, b| (a - s).abs().total_cmp(&(b - s).abs())) else { return s };
-    let (before, now) = site.look(last);
+fn keep_place(old: &[Contact], pair: &Pair<'_>, s: f64, value: f64, length: f64, radius: f64) -> f64 {
+    let here = Some((pair.slot, pair.element as u32));
+    let from = old.partition_point(|c| c.on_shape() < here);
+    let near = old[from..].iter().take_while(|c| c.on_shape() == here);
+    let places = near.filter_map(|c| c.a.thread()).map(|(_, s)| s).filter(|s| *s > 0.0 && *s < 1.0);
+    let Some(last) = places.min_by(|a, b| (a - s).abs().total_cmp(&(b - s).abs())) else { return s };
+    let (before, now) = pair.look(last);
     let farther = before.value.min(now.value) - value;
     // The distance grows by way^2 / (2 (R + r)) from the nearest place of a surface of radius R.
     let (way, allowed) = ((last - s) * length, params::SAME_PLACE * radius);
@@ -454,19 +454,20 @@ fn between(rows: &[ShapeRow], shape: u32, from: f64, to: f64) -> Range<usize> {
 
 /// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on
 /// another one in its place: the half of a post that a thread touches now may be the other one.
-fn inherit(old: &[ShapeContact], model: &Model, rows: &mut [ShapeRow]) {
+fn inherit(old: &[Contact], model: &Model, rows: &mut [ShapeRow]) {
     for c in old {
-        let place = f64::from(c.element) + c.s;
+        let (Some((element, s)), Some(shape)) = (c.a.thread(), c.b.shape()) else { continue };
+        let place = f64::from(element) + s;
         let nearest = |shape: u32, reach: f64, facing: f64| {
             let far = |k: &usize| (rows[*k].place() - place).abs();
             let there = |r: &ShapeRow| {
-                model.rod_of[r.element as usize] == model.rod_of[c.element as usize] && r.normal.dot(c.normal) > facing
+                model.rod_of[r.element as usize] == model.rod_of[element as usize] && r.normal.dot(c.normal) > facing
             };
             between(rows, shape, place - reach, place + reach)
                 .filter(|k| there(&rows[*k]))
                 .min_by(|a, b| far(a).total_cmp(&far(b)))
         };
-        let found = nearest(c.shape, 0.3, 0.5)
+        let found = nearest(shape, 0.3, 0.5)
             .or_else(|| model.shapes.iter().find_map(|(other, _)| nearest(other, 1e-9, 0.9999)));
         if let Some(k) = found {
             rows[k].receive(c);
@@ -766,7 +767,7 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
         let r = candidates.radius[e];
         let length = (x[e + 1] - x[e]).length();
         let (start_pose, pose) = (&motion.start_shape_pose[k], &state.shape_pose[k]);
-        let site = Site {
+        let pair = Pair {
             model,
             slot: *slot,
             element: e,
@@ -791,12 +792,12 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
                 return;
             }
             let at = |x: &[DVec3]| x[e].lerp(x[e + 1], s);
-            let mut before = collider.distance(start_pose, at(site.start));
+            let mut before = collider.distance(start_pose, at(pair.start));
             let normal = pose.orientation * d.normal;
             let facing = (start_pose.orientation.conjugate() * before.normal).dot(d.normal);
             if facing < apart {
                 // It came from elsewhere to this wall, if it was before it.
-                let way = pose.inverse_transform_point(at(x)) - start_pose.inverse_transform_point(at(site.start));
+                let way = pose.inverse_transform_point(at(x)) - start_pose.inverse_transform_point(at(pair.start));
                 before = Distance { value: d.value - d.normal.dot(way), normal: start_pose.orientation * d.normal };
                 if before.value <= 0.0 {
                     return;
@@ -813,7 +814,7 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
                     && row.normal.dot(normal) > apart
             };
             if !rows.iter().chain(&fresh).any(known) {
-                let mut row = site.row(s, before, Distance { value: d.value, normal });
+                let mut row = pair.row(s, before, Distance { value: d.value, normal });
                 (row.normal, row.gap, row.wanted) =
                     (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);
                 fresh.push(row);
@@ -839,10 +840,13 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
 
 /// What the next substep starts from: the forces at the accepted state, not those that its last iteration was computed
 /// with.
-pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mut Rows) {
-    let mut contacts = core::mem::take(&mut state.shape_contacts);
-    contacts.clear();
-    for row in &mut rows.shapes {
+pub(crate) fn contacts<'a>(
+    model: &'a Model,
+    state: &'a State,
+    motion: &'a Motion,
+    rows: &'a mut [ShapeRow],
+) -> impl Iterator<Item = Contact> + use<'a> {
+    rows.iter_mut().filter_map(|row| {
         // How far it slid, and slip that is still to be undone.
         let (slid, drift) = if row.firm {
             let trial = press(model, state, motion, row, false);
@@ -855,22 +859,21 @@ pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mu
         } else {
             look(model, state, motion, row);
             let left = slip(state, motion, row) + (row.friction - row.anchor) * row.entered;
-            let at_limit = row.friction.length() >= 0.9999 * row.mu() * row.normal_force;
-            if at_limit { (left.length(), DVec3::ZERO) } else { (0.0, left.clamp_length_max(0.1 * row.radius)) }
+            let at_limit = row.friction.length() >= params::AT_LIMIT * row.mu() * row.normal_force;
+            if at_limit {
+                (left.length(), DVec3::ZERO)
+            } else {
+                (0.0, left.clamp_length_max(params::DRIFT_MOST * row.radius))
+            }
         };
-        if row.normal_force > 0.0 {
-            contacts.push(ShapeContact {
-                shape: row.shape,
-                element: row.element,
-                s: row.s,
-                normal: row.normal,
-                normal_force: row.normal_force,
-                friction: row.friction,
-                drift,
-                sliding: slid > params::SLIP * row.radius,
-            });
-        }
-    }
-    ShapeContact::sort(&mut contacts);
-    state.shape_contacts = contacts;
+        (row.normal_force > 0.0).then_some(Contact {
+            a: Site::Thread { element: row.element, s: row.s },
+            b: Site::Shape { shape: row.shape },
+            normal: row.normal,
+            normal_force: row.normal_force,
+            friction: row.friction,
+            drift,
+            sliding: slid > params::SLIP * row.radius,
+        })
+    })
 }

@@ -23,7 +23,7 @@ type Vec6 = [f64; 6];
 
 /// A contact: the nodes that it touches, its components there as columns on their positions, and what it adds.
 #[derive(Debug, Clone, Copy)]
-struct Site {
+struct Place {
     count: usize,
     node: [u32; 4],
     jacobian: [DMat3; 4],
@@ -56,7 +56,7 @@ pub(crate) struct Sparse {
     diagonal: Vec<Mat6>,
     /// Coupling of each node to the next one, zero at the end of a zone.
     next: Vec<Option<Mat6>>,
-    sites: Vec<Site>,
+    sites: Vec<Place>,
     fronts: Vec<Front>,
     ups: Vec<u32>,
     owned: Vec<u32>,
@@ -137,7 +137,7 @@ impl Sparse {
 
     /// Adds a contact that touches these blocks, with its components as columns on their positions.
     pub fn push(&mut self, places: impl Iterator<Item = (usize, DMat3)>, compliance: DVec3, diagonal: DVec3) {
-        let mut site = Site {
+        let mut site = Place {
             count: 0,
             node: [0; 4],
             jacobian: [DMat3::ZERO; 4],
@@ -260,7 +260,7 @@ impl Sparse {
         }
         self.data.resize(at, [0.0; 36]);
         by_owner.clear();
-        let owner = |s: &Site| s.node[..s.count].iter().map(|v| place[*v as usize]).min().unwrap_or(0);
+        let owner = |s: &Place| s.node[..s.count].iter().map(|v| place[*v as usize]).min().unwrap_or(0);
         by_owner.extend(self.sites.iter().enumerate().map(|(k, s)| (owner(s), k as u32)));
         by_owner.sort_unstable();
         self.owned.clear();
@@ -482,7 +482,7 @@ fn join(adjacent: &mut [Vec<u32>], a: u32, b: u32) {
     }
 }
 
-fn scatter(site: &Site, force: DVec3, place: &[u32], y: &mut [Vec6]) {
+fn scatter(site: &Place, force: DVec3, place: &[u32], y: &mut [Vec6]) {
     if force == DVec3::ZERO {
         return;
     }
@@ -494,7 +494,7 @@ fn scatter(site: &Site, force: DVec3, place: &[u32], y: &mut [Vec6]) {
     }
 }
 
-fn gather(site: &Site, place: &[u32], z: &[Vec6]) -> DVec3 {
+fn gather(site: &Place, place: &[u32], z: &[Vec6]) -> DVec3 {
     (0..site.count)
         .map(|k| site.jacobian[k].transpose() * DVec3::from_slice(&z[place[site.node[k] as usize] as usize][..3]))
         .sum()

@@ -22,7 +22,7 @@ use crate::params;
 use crate::row::Rows;
 use crate::row::couple::{Endpoint, Entry, Source, regain};
 use crate::segment;
-use crate::state::{State, ThreadContact};
+use crate::state::{Contact, Site, State};
 use glam::DVec3;
 
 /// Two places of thread that may not come nearer than `sum` along `normal`.
@@ -143,7 +143,7 @@ impl ThreadRow {
 pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) {
     let start = &motion.start;
     rows.threads.clear();
-    let old = &state.thread_contacts;
+    let old = state.contacts.threads();
     for (a, b) in &candidates.threads {
         let (a, b) = (*a as usize, *b as usize);
         let c = segment::closest(start[a], start[a + 1], start[b], start[b + 1]);
@@ -185,7 +185,7 @@ pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &
             let known = nearest_known(old, a, b, *s, *t);
             let across = if (*s, *t) == kept { c.apart } else { apart };
             let mut normal = across.try_normalize().unwrap_or(DVec3::Z);
-            if let Some(k) = known.filter(|k| (k.a as usize, k.b as usize) == (a, b) && k.normal.dot(normal) < 0.0) {
+            if let Some((k, _)) = known.filter(|(k, _)| k.normal.dot(normal) < 0.0) {
                 // It was on the other side: it has been pushed through and goes back.
                 normal = if apart.length() < 0.5 * row.sum { -normal } else { normal };
                 if apart.length() == 0.0 {
@@ -241,20 +241,15 @@ fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
 /// `c`. (Within both pieces the direction is the same.) The closest places of pieces that are nearly parallel run along
 /// them with the least tilt. A row that follows moves the force with it, which tilts them back, to and fro from substep
 /// to substep.
-fn keep_place(
-    old: &[ThreadContact],
-    start: &[DVec3],
-    a: usize,
-    b: usize,
-    c: &segment::Closest,
-    radius: f64,
-) -> (f64, f64) {
+fn keep_place(old: &[Contact], start: &[DVec3], a: usize, b: usize, c: &segment::Closest, radius: f64) -> (f64, f64) {
     let inside = |x: f64| x > 0.0 && x < 1.0;
-    let Some(k) = nearest_known(old, a, b, c.s, c.t).filter(|_| inside(c.s) && inside(c.t)) else { return (c.s, c.t) };
-    let apart = start[a].lerp(start[a + 1], k.s) - start[b].lerp(start[b + 1], k.t);
+    let Some((_, k)) = nearest_known(old, a, b, c.s, c.t).filter(|_| inside(c.s) && inside(c.t)) else {
+        return (c.s, c.t);
+    };
+    let apart = start[a].lerp(start[a + 1], k[0]) - start[b].lerp(start[b + 1], k[1]);
     let (farther, allowed) = (apart.length() - c.apart.length(), params::SAME_PLACE * radius);
     let part = if farther <= allowed { 1.0 } else { (allowed / farther).sqrt() };
-    (c.s + (k.s - c.s) * part, c.t + (k.t - c.t) * part)
+    (c.s + (k[0] - c.s) * part, c.t + (k[1] - c.t) * part)
 }
 
 /// Whether the element `other`, which is touched at the place `s` of element `e`, `apart` from there, lies over the
@@ -272,15 +267,18 @@ fn leans(model: &Model, candidates: &Candidates, x: &[DVec3], e: usize, s: f64, 
         && candidates.threads.binary_search(&pair).is_ok()
 }
 
-/// The last contact on the same pair of elements that is nearest in place.
-fn nearest_known(old: &[ThreadContact], a: usize, b: usize, s: f64, t: f64) -> Option<ThreadContact> {
-    let from = old.partition_point(|c| (c.a as usize, c.b as usize) < (a, b));
-    let far = |c: &ThreadContact| (c.s - s).abs() + (c.t - t).abs();
-    old[from..]
-        .iter()
-        .take_while(|c| (c.a as usize, c.b as usize) == (a, b))
-        .min_by(|x, y| far(x).total_cmp(&far(y)))
-        .copied()
+/// The last contact on the same pair of elements that is nearest in place, and its places.
+fn nearest_known(old: &[Contact], a: usize, b: usize, s: f64, t: f64) -> Option<(Contact, [f64; 2])> {
+    let pair = |c: &Contact| c.elements().map(|(a, b)| (a as usize, b as usize));
+    let from = old.partition_point(|c| pair(c) < Some((a, b)));
+    let near = old[from..].iter().take_while(|c| pair(c) == Some((a, b)));
+    let far = |p: &[f64; 2]| (p[0] - s).abs() + (p[1] - t).abs();
+    near.map(|c| (*c, places(c))).min_by(|x, y| far(&x.1).total_cmp(&far(&y.1)))
+}
+
+/// Places on the elements of a contact of threads.
+fn places(c: &Contact) -> [f64; 2] {
+    [c.a, c.b].map(|site| site.thread().map_or(0.0, |(_, s)| s))
 }
 
 /// Leaves one of rows at the same two places (neighboring elements share a particle). Only those: a row between
@@ -295,9 +293,10 @@ fn merge(rows: &mut Vec<ThreadRow>) {
 
 /// Gives each old contact's force and anchor to the row that is nearest to it along both threads, within an element and
 /// a half.
-fn inherit(old: &[ThreadContact], rows: &mut [ThreadRow]) {
+fn inherit(old: &[Contact], rows: &mut [ThreadRow]) {
     for c in old {
-        let (pa, pb) = (f64::from(c.a) + c.s, f64::from(c.b) + c.t);
+        let (Some((a, s)), Some((b, t))) = (c.a.thread(), c.b.thread()) else { continue };
+        let (pa, pb) = (f64::from(a) + s, f64::from(b) + t);
         let from = rows.partition_point(|r| r.place().0 < pa - 1.5);
         let far = |r: &ThreadRow| {
             let p = r.place();
@@ -463,28 +462,26 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
 
 /// What the next substep starts from: the forces, and the part of each sticking row's equation that the solve left
 /// undone.
-pub(crate) fn store(state: &mut State, motion: &Motion, rows: &Rows) {
-    let mut contacts = core::mem::take(&mut state.thread_contacts);
-    contacts.clear();
-    for row in rows.threads.iter().filter(|r| r.force.x > 0.0) {
+pub(crate) fn contacts<'a>(
+    state: &'a State,
+    motion: &'a Motion,
+    rows: &'a [ThreadRow],
+) -> impl Iterator<Item = Contact> + use<'a> {
+    rows.iter().filter(|r| r.force.x > 0.0).map(|row| {
         let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
         let limit = row.mu[usize::from(row.sliding)] * row.force.x;
         let left = row.drift + row.slip(state, motion) + (friction - row.anchor) * row.entered;
-        let at_limit = friction.length() >= 0.9999 * limit;
+        let at_limit = friction.length() >= params::AT_LIMIT * limit;
         let sliding = at_limit && left.length() > params::SLIP * row.radii[0].min(row.radii[1]);
-        let drift = if at_limit { DVec3::ZERO } else { left.clamp_length_max(0.1 * row.radii[0]) };
-        contacts.push(ThreadContact {
-            a: row.a as u32,
-            b: row.b as u32,
-            s: row.s,
-            t: row.t,
+        let most = params::DRIFT_MOST * row.radii[0];
+        Contact {
+            a: Site::Thread { element: row.a as u32, s: row.s },
+            b: Site::Thread { element: row.b as u32, s: row.t },
             normal: row.axes[0],
             normal_force: row.force.x,
             friction,
-            drift,
+            drift: if at_limit { DVec3::ZERO } else { left.clamp_length_max(most) },
             sliding,
-        });
-    }
-    ThreadContact::sort(&mut contacts);
-    state.thread_contacts = contacts;
+        }
+    })
 }

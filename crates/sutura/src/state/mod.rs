@@ -1,11 +1,14 @@
 //! What a snapshot must hold: everything that the next step depends on and the user did not give as `Model`.
 
+mod contact;
+
 use crate::arrays::element_arrays;
 use crate::handle::Slots;
 use crate::math::Pose;
 pub(crate) use crate::model::grip::LoadState;
 use crate::model::grip::{Drive, Hold};
 use crate::model::reel::ReelLaw;
+pub(crate) use contact::{Contact, Contacts, Site};
 use glam::{DQuat, DVec3};
 
 /// What the next substep can count on.
@@ -59,9 +62,8 @@ pub struct State {
     pub(crate) loads: Slots<LoadState>,
     pub(crate) reels: Slots<ReelState>,
 
-    /// Contacts of the last accepted substep, sorted by key.
-    pub(crate) thread_contacts: Vec<ThreadContact>,
-    pub(crate) shape_contacts: Vec<ShapeContact>,
+    /// Contacts of the last accepted substep.
+    pub(crate) contacts: Contacts,
 }
 
 // Accelerations have as many entries, or none where they are not known.
@@ -129,55 +131,6 @@ pub(crate) struct ReelState {
     pub added: i32,
 }
 
-/// A thread-thread contact that the next substep starts from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ThreadContact {
-    /// Elements, `a < b`, and places on them.
-    pub a: u32,
-    pub b: u32,
-    pub s: f64,
-    pub t: f64,
-    /// Unit normal from b toward a: the side that a is on.
-    pub normal: DVec3,
-    /// Normal force \[N\] and friction force on a \[N\].
-    pub normal_force: f64,
-    pub friction: DVec3,
-    /// Slip that the friction spring has still to undo \[m\].
-    pub drift: DVec3,
-    /// Whether it slid.
-    pub sliding: bool,
-}
-
-/// A thread-shape contact that the next substep starts from.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ShapeContact {
-    pub shape: u32,
-    pub element: u32,
-    pub s: f64,
-    pub normal: DVec3,
-    pub normal_force: f64,
-    pub friction: DVec3,
-    /// Slip that the friction spring has still to undo \[m\].
-    pub drift: DVec3,
-    /// Whether it slid.
-    pub sliding: bool,
-}
-
-impl ThreadContact {
-    /// Puts contacts in the order in which they are looked up.
-    pub(crate) fn sort(contacts: &mut [Self]) {
-        contacts
-            .sort_unstable_by(|x, y| (x.a, x.b).cmp(&(y.a, y.b)).then(x.s.total_cmp(&y.s)).then(x.t.total_cmp(&y.t)));
-    }
-}
-
-impl ShapeContact {
-    /// Puts contacts in the order in which they are looked up.
-    pub(crate) fn sort(contacts: &mut [Self]) {
-        contacts.sort_unstable_by(|x, y| (x.shape, x.element).cmp(&(y.shape, y.element)).then(x.s.total_cmp(&y.s)));
-    }
-}
-
 impl State {
     /// Forgets the accelerations, for `why`.
     pub(crate) fn interrupt(&mut self, why: Onset) {
@@ -208,8 +161,7 @@ impl State {
             grips,
             loads,
             reels,
-            thread_contacts,
-            shape_contacts,
+            contacts,
         } = from;
         self.time = *time;
         self.last_h = *last_h;
@@ -231,7 +183,6 @@ impl State {
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
         self.reels.copy_from(reels);
-        self.thread_contacts.clone_from(thread_contacts);
-        self.shape_contacts.clone_from(shape_contacts);
+        self.contacts.copy_from(contacts);
     }
 }

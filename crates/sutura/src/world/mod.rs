@@ -19,7 +19,7 @@ use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
 use crate::state::{Onset, State};
 use crate::step::Step;
-use crate::view::{ContactView, ContactWith, View};
+use crate::view::{ContactView, View};
 use glam::DVec3;
 
 /// Threads, shapes, grips and loads that move together.
@@ -143,35 +143,9 @@ impl World {
         View { model: &self.model, state: &self.state }
     }
 
-    /// Contacts that carry force, at the last accepted substep.
+    /// Contacts that carry force, at the last accepted substep: those of threads with threads, then those with shapes.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + '_ {
-        let place = |e: u32| {
-            let slot = self.model.rod_of[e as usize];
-            (slot as usize, (e - self.model.rods.at(slot).map_or(0, |r| r.first)) as usize)
-        };
-        let point = |e: u32, s: f64| self.state.position[e as usize].lerp(self.state.position[e as usize + 1], s);
-        let threads = self.state.thread_contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| {
-            let (rod, element) = place(c.b);
-            ContactView {
-                a: place(c.a),
-                b: ContactWith::Thread(rod, element, c.t),
-                s: c.s,
-                point: point(c.a, c.s),
-                normal: c.normal,
-                force: c.normal * c.normal_force + c.friction,
-                sliding: c.sliding,
-            }
-        });
-        let shapes = self.state.shape_contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| ContactView {
-            a: place(c.element),
-            b: ContactWith::Shape(c.shape as usize),
-            s: c.s,
-            point: point(c.element, c.s),
-            normal: c.normal,
-            force: c.normal * c.normal_force + c.friction,
-            sliding: c.sliding,
-        });
-        threads.chain(shapes)
+        self.view().contacts()
     }
 
     /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it.

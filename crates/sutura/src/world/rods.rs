@@ -9,7 +9,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::weld::{Member, Side, WeldModel};
 use crate::row;
-use crate::state::{Onset, ReelState};
+use crate::state::{Onset, ReelState, Site};
 use crate::view::RodView;
 use glam::{DQuat, DVec3};
 
@@ -166,14 +166,11 @@ impl World {
             }
         }
         let shift = |e: u32| if e > start { e - count } else { e };
-        state.thread_contacts.retain(|c| !range.contains(&(c.a as usize)) && !range.contains(&(c.b as usize)));
-        for c in &mut state.thread_contacts {
-            (c.a, c.b) = (shift(c.a), shift(c.b));
-        }
-        state.shape_contacts.retain(|c| !range.contains(&(c.element as usize)));
-        for c in &mut state.shape_contacts {
-            c.element = shift(c.element);
-        }
+        state.contacts.retain(|c| c.all_elements().all(|e| !range.contains(&(e as usize))));
+        state.contacts.rename(|site| match site {
+            Site::Thread { element, s } => Site::Thread { element: shift(element), s },
+            Site::Shape { .. } => site,
+        });
         state.grips.retain(|g| g.rod != rod.index);
         state.loads.retain(|l| l.rod != rod.index);
         for (_, weld) in model.welds.iter_mut() {

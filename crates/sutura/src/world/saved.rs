@@ -5,8 +5,7 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::grip::{Hold, LoadKind, Place};
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{Onset, State};
-use glam::DVec3;
+use crate::state::{Onset, Site, State};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -116,26 +115,19 @@ impl World {
         }
         let element = |e: u32| (e as usize) < n && self.model.is_element(e as usize);
         let place = |s: f64| (0.0..=1.0).contains(&s);
-        let forces = |normal: DVec3, normal_force: f64, friction: DVec3| {
-            (normal.length() - 1.0).abs() < 1e-6 && normal_force.is_finite() && friction.is_finite()
+        let site = |site: Site| match site {
+            Site::Thread { element: e, s } => element(e) && place(s),
+            Site::Shape { shape } => self.model.shapes.at(shape).is_some(),
         };
-        let threads = s.thread_contacts.iter().all(|c| {
-            element(c.a)
-                && element(c.b)
-                && c.a < c.b
-                && place(c.s)
-                && place(c.t)
-                && forces(c.normal, c.normal_force, c.friction)
+        let contacts = s.contacts.iter().all(|c| {
+            site(c.a)
+                && site(c.b)
+                && c.elements().is_none_or(|(a, b)| a < b)
+                && (c.normal.length() - 1.0).abs() < 1e-6
+                && c.force().is_finite()
                 && c.drift.is_finite()
         });
-        let shapes = s.shape_contacts.iter().all(|c| {
-            element(c.element)
-                && self.model.shapes.at(c.shape).is_some()
-                && place(c.s)
-                && forces(c.normal, c.normal_force, c.friction)
-                && c.drift.is_finite()
-        });
-        if !(threads && shapes) {
+        if !contacts {
             return Err("a contact is out of range");
         }
         Ok(())

@@ -40,7 +40,7 @@ impl World {
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
         self.model.shapes.remove(shape).ok_or(SHAPE)?;
         self.state.interrupt(Onset::Unknown);
-        self.state.shape_contacts.retain(|c| c.shape != shape.index);
+        self.state.contacts.retain(|c| c.b.shape() != Some(shape.index));
         Ok(())
     }
 
@@ -71,11 +71,12 @@ impl World {
         self.model.shapes.get(shape).ok_or(SHAPE)?;
         let origin = self.state.shape_pose[shape.index()].position;
         let mut sum = Wrench::default();
-        for c in self.state.shape_contacts.iter().filter(|c| c.shape == shape.index) {
-            let e = c.element as usize;
-            let x = self.state.position[e].lerp(self.state.position[e + 1], c.s);
+        for c in self.state.contacts.iter().filter(|c| c.b.shape() == Some(shape.index)) {
+            let Some((element, s)) = c.a.thread() else { continue };
+            let e = element as usize;
+            let x = self.state.position[e].lerp(self.state.position[e + 1], s);
             let surface = x - c.normal * self.radius_of(e);
-            let force = -(c.normal * c.normal_force + c.friction);
+            let force = -c.force();
             sum.force += force;
             sum.torque += (surface - origin).cross(force);
         }

@@ -127,7 +127,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         gained = work(rods, rows) - rods.work_built_up(model, state);
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
         let (turn, shift) = rods.largest_move(model);
-        let turn = max_or_nan(turn, rows.welds.turn_squared(rows.sliders.count(), &rows.border)).sqrt();
+        let turn = max_or_nan(turn, rows.welds.turn_squared(rows.movers.count(), &rows.border)).sqrt();
         scale = limit(state, motion, rods, candidates, turn);
         let slid = apply(model, state, rods, rows, scale, true);
         row::shape::predict(rows, &rods.step, scale);
@@ -229,6 +229,6 @@ fn limit(state: &State, motion: &Motion, rods: &RodScratch, candidates: &Candida
 /// Takes a part of the step, `anew` or back on the last one; the largest move of a pushed shape \[m\].
 fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> f64 {
     rods.apply(model, state, scale, anew);
-    rows.welds.apply(state, rows.sliders.count(), &rows.border, scale);
-    rows.sliders.apply(state, &rows.border, scale)
+    rows.welds.apply(state, rows.movers.count(), &rows.border, scale);
+    rows.movers.apply(state, &rows.border, scale)
 }

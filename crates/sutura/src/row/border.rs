@@ -7,7 +7,7 @@
 //! ```
 //!
 //! and are eliminated last: `dy = (D - B^T H^-1 B)^-1 (s - B^T z)`, `dz = z - H^-1 B dy` with `z = H^-1 r`. What an
-//! unknown is and which forces act on it is in [`pushed`](crate::row::pushed) and [`weld`](crate::row::weld).
+//! unknown is and which forces act on it is in [`movers`](crate::row::movers) and [`weld`](crate::row::weld).
 
 use crate::math::solve_dense;
 use crate::rod::factor::System;

@@ -16,6 +16,7 @@ use crate::rod::scratch::RodScratch;
 use crate::row::border::Border;
 use crate::row::cone::{Cone, Limits};
 use crate::row::dense::Dense;
+use crate::row::side::{Endpoint, Side};
 use crate::row::sparse::Sparse;
 use crate::row::{Rows, shape, thread};
 use crate::state::State;
@@ -29,58 +30,14 @@ pub(crate) enum Source {
     Shape(u32),
 }
 
-/// A thread's side of a contact: its Jacobian as right-side columns (normal, two tangents) on blocks `element` and
-/// `element + 1`.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Endpoint {
-    pub element: usize,
-    /// Columns on the positions of its two particles.
-    pub here: DMat3,
-    pub next: DMat3,
-}
-
-impl Endpoint {
-    /// The place `s` of the centerline of `element`, pushed along `axes`.
-    pub fn new(element: usize, s: f64, axes: [DVec3; 3]) -> Self {
-        let axes = DMat3::from_cols(axes[0], axes[1], axes[2]);
-        Endpoint { element, here: axes * (1.0 - s), next: axes * s }
-    }
-
-    /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
-    fn restricted(&self, freedom: &[Freedom]) -> Self {
-        let keep = |node: usize, columns: DMat3| {
-            if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns }
-        };
-        let x = 2 * self.element;
-        Endpoint { here: keep(x, self.here), next: keep(x + 2, self.next), ..*self }
-    }
-
-    fn within(&self, zone: &Range<usize>) -> bool {
-        zone.contains(&self.element) && self.element + 1 < zone.end
-    }
-
-    fn push(&self, force: DVec3, right: &mut [DVec3]) {
-        right[2 * self.element] += self.here * force;
-        right[2 * self.element + 2] += self.next * force;
-    }
-
-    fn work(&self, force: DVec3, step: &[DVec3]) -> f64 {
-        let k = 2 * self.element;
-        (self.here * force).dot(step[k]) + (self.next * force).dot(step[k + 2])
-    }
-}
-
 /// One contact.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry {
     pub source: Source,
     /// Number of its island, found here.
     pub island: u32,
-    /// The second counts only with `two`: a shape's side has no rod behind it.
-    pub ends: [Endpoint; 2],
-    pub two: bool,
-    /// A pushed shape's unknown and what a unit move of it adds to the three components.
-    pub slider: Option<(usize, DVec3)>,
+    /// What its force pushes, and against what.
+    pub sides: [Side; 2],
     /// Gap, and slip still to undo, that the step without contact forces would leave \[m\].
     pub free: DVec3,
     pub mu: f64,
@@ -92,12 +49,18 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    fn ends(&self) -> &[Endpoint] {
-        &self.ends[..1 + usize::from(self.two)]
+    /// Its places on threads.
+    fn ends(&self) -> impl Iterator<Item = &Endpoint> + Clone {
+        self.sides.iter().filter_map(Side::chain)
     }
 
     fn touches(&self, zone: &Range<usize>) -> bool {
-        self.ends().iter().any(|p| p.within(zone))
+        self.ends().any(|p| p.within(zone))
+    }
+
+    /// Change of its gap and slips by a step.
+    fn moved(&self, axis: usize, step: &[DVec3], border: &Border) -> f64 {
+        self.sides.iter().map(|side| side.moved(axis, step, border)).sum()
     }
 }
 
@@ -134,7 +97,7 @@ impl Assembly {
         for (_, zone) in rods {
             endpoints.clear();
             for (k, entry) in entries.iter().enumerate() {
-                let inside = entry.ends().iter().filter(|p| p.within(zone));
+                let inside = entry.ends().filter(|p| p.within(zone));
                 endpoints.extend(inside.map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
             }
             if endpoints.is_empty() {
@@ -174,11 +137,13 @@ impl Assembly {
         let Assembly { reach, small, .. } = self;
         reach.clear();
         for entry in entries {
-            for axis in 0..3 {
-                let unit = DVec3::AXES[axis];
-                for k in 0..m {
-                    let own = entry.slider.map_or(0.0, |(j, d)| if j == k { d[axis] } else { 0.0 });
-                    reach.push(entry.ends().iter().map(|p| p.work(unit, border.response(k))).sum::<f64>() - own);
+            for unit in DVec3::AXES {
+                let from = reach.len();
+                reach.extend((0..m).map(|k| entry.ends().map(|p| p.work(unit, border.response(k))).sum::<f64>()));
+                for side in &entry.sides {
+                    if let Side::Shared(moves) = side {
+                        moves.columns().for_each(|(k, c)| reach[from + k] -= unit.dot(c));
+                    }
                 }
             }
         }
@@ -214,7 +179,7 @@ const MANY: usize = 64;
 /// neighbors and those that contacts touch with five, about thrice. What rods share and the tension unknowns of
 /// inextensible elements are in the dense one only.
 fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry], n: usize) -> bool {
-    if entries.iter().filter(|e| e.force.x > 0.0).count() < MANY && entries.iter().any(|e| e.two) {
+    if entries.iter().filter(|e| e.force.x > 0.0).count() < MANY && entries.iter().any(|e| e.ends().count() > 1) {
         return false;
     }
     let mut blocks = 0;
@@ -224,7 +189,7 @@ fn pays(system: &System, rods: &[(Range<usize>, Range<usize>)], entries: &[Entry
         }
         blocks += zone.len();
     }
-    let touched = (2 * entries.iter().map(|e| e.ends().len()).sum::<usize>()).min(blocks);
+    let touched = (2 * entries.iter().map(|e| e.ends().count()).sum::<usize>()).min(blocks);
     let n = n as f64;
     30.0 * n * n + n * n * n / 3.0 > 3.0 * (1500.0 * blocks as f64 + 5000.0 * touched as f64)
 }
@@ -288,12 +253,13 @@ fn find_islands(coupling: &mut Coupling, rods: &[(Range<usize>, Range<usize>)], 
     // In the order of slots, which need not be that of the arrays.
     let rod_of = |p: &Endpoint| rods.iter().position(|(blocks, _)| blocks.contains(&p.element)).unwrap_or(0);
     for entry in entries.iter_mut() {
-        let first = rod_of(&entry.ends[0]);
+        let mut ends = entry.ends().map(rod_of);
+        let first = ends.next().unwrap_or(0);
+        let second = ends.next();
+        drop(ends);
         entry.island = first as u32;
-        if !entry.two {
-            continue;
-        }
-        let (a, b) = (root[first], root[rod_of(&entry.ends[1])]);
+        let Some(second) = second else { continue };
+        let (a, b) = (root[first], root[second]);
         if a != b {
             root.iter_mut().filter(|r| **r == a.max(b)).for_each(|r| *r = a.min(b));
         }
@@ -388,7 +354,7 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
     let entries = &mut rows.solver.entries;
     entries.clear();
     thread::enter(state, motion, step, &mut rows.threads, entries);
-    shape::enter(state, motion, step, &mut rows.shapes, (&rows.sliders, &rows.border), entries);
+    shape::enter(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
@@ -426,7 +392,7 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
             zones().for_each(|zone| system.invert_zone(zone));
             island.sparse.begin(system, zones());
             for entry in entries {
-                let ends = entry.ends().iter().map(|p| p.restricted(freedom));
+                let ends = entry.ends().map(|p| p.restricted(freedom));
                 let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
                 let places = ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]);
                 island.sparse.push(places, entry.compliance, diagonal);
@@ -485,9 +451,7 @@ fn respond(
 fn shift(entries: &[Entry], border: &Border, step: &[DVec3], b: &mut [f64]) {
     for (entry, b) in entries.iter().zip(b.chunks_exact_mut(3)) {
         for (axis, b) in b.iter_mut().enumerate() {
-            let unit = DVec3::AXES[axis];
-            let pushed = entry.slider.map_or(0.0, |(k, d)| d[axis] * border.step(k));
-            *b += entry.ends().iter().map(|p| p.work(unit, step)).sum::<f64>() + pushed;
+            *b += entry.moved(axis, step, border);
         }
     }
 }
@@ -496,12 +460,7 @@ fn shift(entries: &[Entry], border: &Border, step: &[DVec3], b: &mut [f64]) {
 fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec3]) {
     for (entry, f) in entries.iter().zip(force.chunks_exact(3)) {
         let f = DVec3::from_slice(f);
-        for p in entry.ends() {
-            p.push(f, right);
-        }
-        if let Some((slider, direction)) = entry.slider {
-            border.load(slider, direction.dot(f));
-        }
+        entry.sides.iter().for_each(|side| side.push(f, right, border));
     }
 }
 
@@ -588,8 +547,7 @@ pub(crate) fn add_forces(rows: &Rows, rhs: &mut [DVec3]) {
 /// Work of the entries' forces along the step.
 pub(crate) fn work(rows: &Rows, step: &[DVec3]) -> f64 {
     let border = &rows.border;
-    let pushed = |e: &Entry| e.slider.map_or(0.0, |(k, d)| d.dot(e.force) * border.step(k));
-    let on = |e: &Entry| e.ends().iter().map(|p| p.work(e.force, step)).sum::<f64>() + pushed(e);
+    let on = |e: &Entry| e.sides.iter().map(|side| side.work(e.force, step, border)).sum::<f64>();
     rows.solver.entries.iter().filter(|e| e.force != DVec3::ZERO).map(on).sum()
 }
 

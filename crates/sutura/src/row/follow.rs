@@ -62,7 +62,7 @@ impl Follow {
             let mut due = false;
             let largest = self.rows.iter().map(|k| rows.shapes[*k as usize].normal_force).fold(0.0, f64::max);
             for k in &self.rows {
-                let (missing, active) = rows.shapes[*k as usize].missing(&rods.step, &rows.sliders, &rows.border);
+                let (missing, active) = rows.shapes[*k as usize].missing(&rods.step, &rows.movers, &rows.border);
                 due |= missing.abs() > 0.5 * crate::params::OFF_BALANCE * largest;
                 self.missing.push(missing);
                 self.active.push(active);
@@ -85,8 +85,8 @@ impl Follow {
         self.step.clear();
         self.step.resize(rods.step.len(), DVec3::ZERO);
         for (k, v) in self.rows.iter().zip(&self.change) {
-            let Rows { shapes, sliders, border, .. } = rows;
-            shapes[*k as usize].push(*v, &mut self.step, sliders, border);
+            let Rows { shapes, movers, border, .. } = rows;
+            shapes[*k as usize].push(*v, &mut self.step, movers, border);
         }
     }
 
@@ -98,7 +98,7 @@ impl Follow {
         couple::pressed_response(rods, rows, effort, &mut self.step);
         for ((k, v), active) in self.rows.iter().zip(&mut self.change).zip(&self.active) {
             if *active {
-                *v -= rows.shapes[*k as usize].gained(&self.step, &rows.sliders, &rows.border);
+                *v -= rows.shapes[*k as usize].gained(&self.step, &rows.movers, &rows.border);
             }
         }
         rows.border.swap_steps(&mut self.border);

@@ -9,8 +9,9 @@ pub(crate) mod delassus;
 pub(crate) mod dense;
 pub(crate) mod follow;
 pub(crate) mod ldl;
-pub(crate) mod pushed;
+pub(crate) mod movers;
 pub(crate) mod shape;
+pub(crate) mod side;
 pub(crate) mod sparse;
 pub(crate) mod thread;
 pub(crate) mod weld;
@@ -26,7 +27,7 @@ use crate::state::State;
 pub(crate) struct Rows {
     pub shapes: Vec<shape::ShapeRow>,
     pub threads: Vec<thread::ThreadRow>,
-    pub sliders: pushed::Sliders,
+    pub movers: movers::Movers,
     pub welds: weld::Welds,
     pub border: border::Border,
     pub solver: couple::Coupling,

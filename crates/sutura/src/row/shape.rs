@@ -32,8 +32,9 @@ use crate::params;
 use crate::rod::scratch::RodScratch;
 use crate::row::Rows;
 use crate::row::border::Border;
-use crate::row::couple::{Endpoint, Entry, Source, regain};
-use crate::row::pushed::Sliders;
+use crate::row::couple::{Entry, Source, regain};
+use crate::row::movers::Movers;
+use crate::row::side::{Endpoint, Side};
 use crate::state::{Contact, Site, State};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -166,14 +167,14 @@ impl ShapeRow {
     }
 
     /// Returns what its friction is too small by where the step leads, and whether it presses there.
-    pub fn missing(&self, step: &[DVec3], sliders: &Sliders, border: &Border) -> (f64, bool) {
-        let pressed = self.normal_force - self.stiffness * self.normal.dot(moved(self, step, sliders, border));
+    pub fn missing(&self, step: &[DVec3], movers: &Movers, border: &Border) -> (f64, bool) {
+        let pressed = self.normal_force - self.stiffness * self.normal.dot(moved(self, step, movers, border));
         (self.mu() * (pressed.max(0.0) - self.pressed) - self.followed, pressed > 0.0)
     }
 
     /// What the limit of its friction gains by a step.
-    pub fn gained(&self, step: &[DVec3], sliders: &Sliders, border: &Border) -> f64 {
-        -self.mu() * self.stiffness * self.normal.dot(moved(self, step, sliders, border))
+    pub fn gained(&self, step: &[DVec3], movers: &Movers, border: &Border) -> f64 {
+        -self.mu() * self.stiffness * self.normal.dot(moved(self, step, movers, border))
     }
 
     /// Makes its friction larger.
@@ -182,12 +183,12 @@ impl ShapeRow {
     }
 
     /// Adds a friction force of this size, and its reaction, to right sides.
-    pub fn push(&self, size: f64, right: &mut [DVec3], sliders: &Sliders, border: &mut Border) {
+    pub fn push(&self, size: f64, right: &mut [DVec3], movers: &Movers, border: &mut Border) {
         let (e, force) = (self.element as usize, self.rim * size);
         right[2 * e] += force * (1.0 - self.s);
         right[2 * e + 2] += force * self.s;
-        if let Some(k) = sliders.find(self.shape) {
-            border.load(k, -sliders.direction(k).dot(force));
+        if let Some(moves) = movers.moves(self.shape) {
+            moves.load(-force, border);
         }
     }
 
@@ -313,9 +314,9 @@ impl Pair<'_> {
 /// Collects the rows of the substep and gives them the forces of the last one.
 pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows, h: f64) {
     let Motion { start, start_shape_pose, .. } = motion;
-    let (rows, sliders) = (&mut rows.shapes, &mut rows.sliders);
+    let (rows, movers) = (&mut rows.shapes, &mut rows.movers);
     rows.clear();
-    sliders.begin(model, h);
+    movers.begin(model, h);
     let x = &state.position;
     let mut last = None;
     for (slot, e) in &candidates.shapes {
@@ -619,8 +620,8 @@ pub(crate) fn assemble(
     first: bool,
 ) {
     let RodScratch { system, rhs, .. } = rods;
-    rows.border.clear(rows.sliders.count() + rows.welds.count());
-    rows.sliders.assemble(model, state, &motion.start_shape_pose, &mut rows.border);
+    rows.border.clear(rows.movers.count() + rows.welds.count());
+    rows.movers.assemble(model, state, &motion.start_shape_pose, &mut rows.border);
     for row in &mut rows.shapes {
         if !row.firm {
             look(model, state, motion, row);
@@ -636,31 +637,31 @@ pub(crate) fn assemble(
         system.diagonal[2 * e] += stiffness * (a * a);
         system.diagonal[2 * e + 2] += stiffness * (b * b);
         system.after[2 * e] += stiffness * (a * b);
-        rows.sliders.add(row.shape, e, &stiffness, force, [a, b], &mut rows.border);
+        rows.movers.add(row.shape, e, &stiffness, force, [a, b], &mut rows.border);
         row.tangent = stiffness;
         row.followed = 0.0;
     }
 }
 
 /// Move of a row's place against its shape along the last step.
-fn moved(row: &ShapeRow, step: &[DVec3], sliders: &Sliders, border: &Border) -> DVec3 {
+fn moved(row: &ShapeRow, step: &[DVec3], movers: &Movers, border: &Border) -> DVec3 {
     let e = row.element as usize;
-    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - sliders.moved(row.shape, border)
+    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, border)
 }
 
 /// Notes the forces that a step of this length predicts for the firm rows.
 pub(crate) fn predict(rows: &mut Rows, step: &[DVec3], scale: f64) {
-    let (sliders, border) = (&rows.sliders, &rows.border);
+    let (movers, border) = (&rows.movers, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale)
-            - row.tangent * moved(row, step, sliders, border) * scale;
+            - row.tangent * moved(row, step, movers, border) * scale;
     }
 }
 
 /// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
 pub(crate) fn work_unforeseen(rows: &Rows, step: &[DVec3]) -> f64 {
     let on = |row: &ShapeRow| {
-        (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.sliders, &rows.border))
+        (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.movers, &rows.border))
     };
     rows.shapes.iter().filter(|r| r.firm).map(on).sum()
 }
@@ -671,14 +672,13 @@ pub(crate) fn enter(
     motion: &Motion,
     step: &[DVec3],
     rows: &mut [ShapeRow],
-    shared: (&Sliders, &Border),
+    shared: (&Movers, &Border),
     entries: &mut Vec<Entry>,
 ) {
-    let (sliders, border) = shared;
+    let (movers, border) = shared;
     for (k, row) in rows.iter_mut().enumerate().filter(|(_, r)| !r.firm) {
         let e = row.element as usize;
-        let slider = sliders.find(row.shape);
-        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - sliders.moved(row.shape, border);
+        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, border);
         let gap = row.gap + row.normal.dot(moved);
         if row.normal_force <= 0.0 && !row.wanted && gap > params::PRUNE * row.radius {
             (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
@@ -686,19 +686,14 @@ pub(crate) fn enter(
         }
         row.entered = row.compliance();
         let axes = row.axes();
-        let [n, t1, t2] = axes;
+        let [_, t1, t2] = axes;
         let slip = slip(state, motion, row) + moved - row.anchor * row.entered;
         let (allowed, normal) = regain(row.start_gap, (row.carried / row.hardness).sqrt(), row.entered);
-        let end = Endpoint::new(e, row.s, axes);
+        let shape = movers.moves(row.shape).map_or(Side::Still, |moves| Side::Shared(moves.against(axes)));
         entries.push(Entry {
             source: Source::Shape(k as u32),
             island: 0,
-            ends: [end, end],
-            two: false,
-            slider: slider.map(|j| {
-                let d = -sliders.direction(j);
-                (j, DVec3::new(d.dot(n), d.dot(t1), d.dot(t2)))
-            }),
+            sides: [Side::Chain(Endpoint::new(e, row.s, axes)), shape],
             free: DVec3::new(gap - allowed, slip.dot(t1), slip.dot(t2)),
             mu: row.mu(),
             compliance: DVec3::new(normal, row.entered, row.entered),
@@ -723,7 +718,7 @@ pub(crate) fn settled(
     step: &[DVec3],
     iterations: u32,
 ) -> bool {
-    let (sliders, border) = (&rows.sliders, &rows.border);
+    let (movers, border) = (&rows.movers, &rows.border);
     let mut settled = true;
     // Rod by rod: what a taut one bears says nothing about a light one.
     for rows in rows.shapes.chunk_by_mut(|a, b| model.rod_of[a.element as usize] == model.rod_of[b.element as usize]) {
@@ -740,8 +735,8 @@ pub(crate) fn settled(
                 let normal_force = (row.normal_force - row.stiffness * (now.gap - row.gap)).max(0.0);
                 let off = (now.normal_force - normal_force).abs().max((now.friction - friction).length());
                 // Where one after another goes over its limit the last digit would take an iteration each.
-                let front = iterations > params::FRONT
-                    && moved(row, step, sliders, border).length() < params::SLIP * row.radius;
+                let front =
+                    iterations > params::FRONT && moved(row, step, movers, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
                 look(model, state, motion, &mut now);

@@ -20,7 +20,8 @@ use crate::model::Model;
 use crate::motion::Motion;
 use crate::params;
 use crate::row::Rows;
-use crate::row::couple::{Endpoint, Entry, Source, regain};
+use crate::row::couple::{Entry, Source, regain};
+use crate::row::side::{Endpoint, Side};
 use crate::segment;
 use crate::state::{Contact, Site, State};
 use glam::DVec3;
@@ -338,9 +339,7 @@ pub(crate) fn enter(state: &State, motion: &Motion, step: &[DVec3], rows: &mut [
         entries.push(Entry {
             source: Source::Thread(k as u32),
             island: 0,
-            ends: [a, b],
-            two: true,
-            slider: None,
+            sides: [Side::Chain(a), Side::Chain(b)],
             free: DVec3::new(gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])),
             mu: row.mu[usize::from(row.sliding)],
             compliance: DVec3::new(normal, row.entered, row.entered),

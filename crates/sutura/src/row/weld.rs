@@ -158,8 +158,8 @@ fn vector(border: &Border, k: usize) -> DVec3 {
 /// Makes the rows of welded particles those of the weld: the rods are assembled, nothing is taken out yet.
 pub(crate) fn gather(model: &Model, state: &State, rods: &mut RodScratch, rows: &mut Rows, exact: bool) {
     let RodScratch { system, rhs, .. } = rods;
-    let Rows { welds, border, sliders, .. } = rows;
-    let first = sliders.count();
+    let Rows { welds, border, movers, .. } = rows;
+    let first = movers.count();
     let Welds { welds, joints, links } = welds;
     // A pushed shape that touches an element beside a weld couples with the weld.
     for k in 0..first {

@@ -1,28 +1,32 @@
-//! Shapes pushed along a line by a force: one unknown each, coupled to all threads that touch the shape
-//! ([`border`](crate::row::border)). The shape has no mass; the force law `F (1 - v / v_limit)` is its damping, taken
-//! implicitly.
+//! Shapes that contact moves: their unknowns are the first of the border ([`border`](crate::row::border)), coupled to
+//! all threads that touch them.
+//!
+//! A shape that a force pushes along a line has one. It has no mass; the force law `F (1 - v / v_limit)` is its
+//! damping, taken implicitly.
 
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
 use crate::row::border::Border;
+use crate::row::side::Moves;
 use crate::state::State;
 use glam::{DMat3, DVec3};
 
+/// A shape on a line, and the number of its unknown.
 struct Slider {
     shape: u32,
     direction: DVec3,
 }
 
-/// The pushed shapes of the substep. Their unknowns are the first of the border.
+/// The shapes that may move in the substep.
 #[derive(Default)]
-pub(crate) struct Sliders {
+pub(crate) struct Movers {
     sliders: Vec<Slider>,
     /// Length of the solve \[s\].
     h: f64,
 }
 
-impl Sliders {
-    /// Which shapes may slide. A pushed shape without force stays.
+impl Movers {
+    /// Lists the shapes that may move. A pushed shape without force stays.
     pub fn begin(&mut self, model: &Model, h: f64) {
         self.sliders.clear();
         self.h = h;
@@ -35,11 +39,12 @@ impl Sliders {
         }
     }
 
+    /// Number of unknowns.
     pub fn count(&self) -> usize {
         self.sliders.len()
     }
 
-    /// Puts the force laws into the border.
+    /// Puts what acts on the shapes beside contact into the border.
     pub fn assemble(&self, model: &Model, state: &State, start: &[crate::math::Pose], border: &mut Border) {
         let h = self.h;
         for (k, s) in self.sliders.iter().enumerate() {
@@ -54,28 +59,29 @@ impl Sliders {
         }
     }
 
-    /// Adds a contact of the shape with the element `e`: stiffness, force on the thread and weights of its particles.
-    pub fn add(&self, shape: u32, e: usize, stiffness: &DMat3, force: DVec3, weights: [f64; 2], border: &mut Border) {
-        let Some(k) = self.find(shape) else { return };
-        let direction = self.direction(k);
-        let pull = *stiffness * direction;
-        border.link(k, 2 * e, -pull * weights[0]);
-        border.link(k, 2 * e + 2, -pull * weights[1]);
-        border.add_own(k, k, direction.dot(pull));
-        border.push(k, -direction.dot(force));
+    /// How a shape's material point moves with its unknowns; none where nothing moves the shape.
+    pub fn moves(&self, shape: u32) -> Option<Moves> {
+        let k = self.sliders.iter().position(|s| s.shape == shape)?;
+        Some(Moves::new(k, &[self.sliders[k].direction]))
     }
 
-    /// The number of a shape that is pushed.
-    pub fn find(&self, shape: u32) -> Option<usize> {
-        self.sliders.iter().position(|s| s.shape == shape)
-    }
-    pub fn direction(&self, k: usize) -> DVec3 {
-        self.sliders[k].direction
-    }
-
-    /// Move of a shape in this Newton iteration so far \[m\].
+    /// Move of a point of a shape in this Newton iteration so far \[m\].
     pub fn moved(&self, shape: u32, border: &Border) -> DVec3 {
-        self.find(shape).map_or(DVec3::ZERO, |k| self.direction(k) * border.step(k))
+        self.moves(shape).map_or(DVec3::ZERO, |m| m.along(border))
+    }
+
+    /// Adds a contact of a shape with the element `e`: stiffness, force on the thread and weights of its particles.
+    pub fn add(&self, shape: u32, e: usize, stiffness: &DMat3, force: DVec3, weights: [f64; 2], border: &mut Border) {
+        let Some(moves) = self.moves(shape) else { return };
+        for (k, direction) in moves.columns() {
+            let pull = *stiffness * direction;
+            border.link(k, 2 * e, -pull * weights[0]);
+            border.link(k, 2 * e + 2, -pull * weights[1]);
+            for (j, other) in moves.columns() {
+                border.add_own(k, j, other.dot(pull));
+            }
+            border.push(k, -direction.dot(force));
+        }
     }
 
     /// Moves the shapes by their part of the update; the largest move \[m\].

@@ -215,6 +215,7 @@ impl Way {
                 Drive::Hand { direction: self.direction(direction), force: force * s * s, speed_limit }
             }
             Drive::Pose => Drive::Pose,
+            other => panic!("{other:?} is not turned and scaled"),
         };
         Held {
             place: self.place(grip.place, n),

@@ -474,11 +474,13 @@ impl Stage {
                 Drive::Force { direction, force, speed_limit } | Drive::Hand { direction, force, speed_limit } => {
                     Way::Pushed(direction, force, speed_limit)
                 }
+                _ => return None,
             },
             Mover::Shape(i) => match self.world.shape(self.shapes[i]).ok()?.motion {
                 ShapeMotion::Fixed => Way::Fixed,
                 ShapeMotion::Driven => Way::Posed,
                 ShapeMotion::Pushed { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
+                _ => return None,
             },
         })
     }

@@ -135,7 +135,7 @@ struct SeenShape {
 #[derive(Debug)]
 struct SeenWeld {
     places: Vec<(usize, f64)>,
-    exempt: f64,
+    filter_distance: f64,
 }
 
 /// One thread at one state, as plain slices.
@@ -177,7 +177,12 @@ impl Audit {
             positions: r.positions(),
             rest_lengths: r.rest_lengths(),
         });
-        self.observe_slices(view.time(), rods, view.shapes(), view.welds().map(|w| (w.exempt(), w.places().collect())));
+        self.observe_slices(
+            view.time(),
+            rods,
+            view.shapes(),
+            view.welds().map(|w| (w.filter_distance(), w.places().collect())),
+        );
     }
 
     fn observe_slices<'a>(
@@ -246,12 +251,12 @@ impl Audit {
     fn take_welds(&mut self, welds: impl Iterator<Item = (f64, Vec<(usize, usize)>)>) {
         let Audit { now, arc, welds: seen, .. } = self;
         seen.clear();
-        for (exempt, places) in welds {
+        for (filter_distance, places) in welds {
             let place = |(slot, particle): (usize, usize)| {
                 let k = now.rods.iter().position(|rod| rod.slot == slot)?;
                 Some((k, arc[now.rods[k].first + particle]))
             };
-            seen.push(SeenWeld { places: places.into_iter().filter_map(place).collect(), exempt });
+            seen.push(SeenWeld { places: places.into_iter().filter_map(place).collect(), filter_distance });
         }
     }
 
@@ -286,8 +291,9 @@ impl Audit {
                 .map(|p| (p.1 - to).max(from - p.1).max(0.0))
                 .fold(f64::INFINITY, f64::min)
         };
-        let joined =
-            |i: usize, e: usize, k: usize, f: usize| welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.exempt);
+        let joined = |i: usize, e: usize, k: usize, f: usize| {
+            welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.filter_distance)
+        };
         for (i, rod) in now.rods.iter().enumerate() {
             let apart = core::f64::consts::PI * rod.radius;
             trees[i].pairs(&mut |e, f| {

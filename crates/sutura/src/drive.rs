@@ -7,7 +7,7 @@ use crate::model::grip::{Drive, Hold, LoadKind};
 use crate::model::shape::ShapeMotion;
 use crate::motion::Motion;
 use crate::newton::Solver;
-use crate::rod::freedom::{ClampJoint, Freedom};
+use crate::rod::constraint::{ClampJoint, NodeConstraint};
 use crate::rod::{brake, strain};
 use crate::state::{GripState, State};
 use crate::view::View;
@@ -93,7 +93,7 @@ pub(crate) fn predict(
     motion.start.copy_from_slice(&state.position);
     motion.start_frame.copy_from_slice(&state.orientation);
     motion.start_shape_pose.clone_from(&state.shape_pose);
-    rods.freedom.fill(Freedom::Free);
+    rods.constraint.fill(NodeConstraint::Free);
     rods.joint_on.fill(true);
     rods.clamps.clear();
     rows.welds.begin(model, state, &mut rods.joint_on, stage.length());
@@ -103,7 +103,7 @@ pub(crate) fn predict(
         let rod = model.rods.at(*slot).expect("rods live through a step");
         for i in rod.particles() {
             (state.position[i], state.orientation[i]) = (motion.start[i], motion.start_frame[i]);
-            (rods.freedom[2 * i], rods.freedom[2 * i + 1]) = (Freedom::Held, Freedom::Held);
+            (rods.constraint[2 * i], rods.constraint[2 * i + 1]) = (NodeConstraint::Held, NodeConstraint::Held);
         }
     }
     let t = began + stage.end;
@@ -128,7 +128,7 @@ pub(crate) fn predict(
         };
         let mut place = |i: usize, position: DVec3| match line {
             None => {
-                rods.freedom[2 * i] = Freedom::Held;
+                rods.constraint[2 * i] = NodeConstraint::Held;
                 state.position[i] = position;
             }
             Some((direction, force, damper)) if force > 0.0 => {
@@ -139,16 +139,16 @@ pub(crate) fn predict(
                 };
                 let (force, damper) = (force * count, damper * count);
                 if matches!(grip.drive, Drive::Hand { .. }) {
-                    rods.freedom[2 * i] = Freedom::Led { force: direction * force, damper, from };
+                    rods.constraint[2 * i] = NodeConstraint::Damped { force: direction * force, damper, from };
                     state.position[i] = motion.start[i];
                     return;
                 }
-                rods.freedom[2 * i] = Freedom::Line { direction, force, damper, from };
+                rods.constraint[2 * i] = NodeConstraint::Guided { direction, force, damper, from };
                 let along = direction * direction.dot(state.position[i] - motion.start[i]);
                 state.position[i] = motion.start[i] + along;
             }
             Some(_) => {
-                rods.freedom[2 * i] = Freedom::Held;
+                rods.constraint[2 * i] = NodeConstraint::Held;
                 state.position[i] = motion.start[i];
             }
         };
@@ -202,14 +202,14 @@ pub(crate) fn predict(
                 let span = pose.orientation * grip.half_span;
                 place(i, pose.position - span);
                 place(i + 1, pose.position + span);
-                rods.freedom[2 * i + 1] = Freedom::Held;
+                rods.constraint[2 * i + 1] = NodeConstraint::Held;
                 state.orientation[i] = pose.orientation;
                 motion.target_frame[i] = pose.orientation;
                 motion.carried_spin[i] = log(pose.orientation * motion.start_frame[i].conjugate()) / stage.length();
             }
         }
     }
-    rows.welds.predict(model, state, &mut rods.freedom, stage.length());
+    rows.welds.predict(model, state, &mut rods.constraint, stage.length());
     move_shapes(model, state, interval, t, stage.length());
 }
 

@@ -25,6 +25,7 @@ use core::ops::{ControlFlow, Deref};
 
 /// Something done to a world: one call of a method of [`World`] that changes it.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Input {
     /// [`World::set_settings`].
     Settings(Settings),

@@ -18,7 +18,7 @@ use crate::model::Model;
 use crate::motion::Motion;
 use crate::params::Integrator;
 use crate::rod::strain;
-use crate::state::{Contact, Onset, State};
+use crate::state::{Contact, History, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use core::ops::Range;
 use glam::DVec3;
@@ -60,12 +60,12 @@ const SPAN: f64 = 1.0 - FRAC_1_SQRT_2;
 
 impl Method {
     /// The method for the next substep, of length `h`.
-    pub fn of(model: &Model, onset: Onset, h: f64) -> Method {
-        match (model.settings.integrator, onset) {
-            (Integrator::ImplicitEuler, _) | (Integrator::TrBdf2, Onset::Broken) => Method::Euler,
+    pub fn of(model: &Model, history: History, h: f64) -> Method {
+        match (model.settings.integrator, history) {
+            (Integrator::ImplicitEuler, _) | (Integrator::TrBdf2, History::Discontinuous) => Method::Euler,
             (Integrator::TrBdf2, _) if drags_hard(model, h) => Method::Euler,
-            (Integrator::TrBdf2, Onset::Unknown) => Method::Alexander,
-            (Integrator::TrBdf2, Onset::Smooth) => Method::TrBdf2,
+            (Integrator::TrBdf2, History::Unknown) => Method::Alexander,
+            (Integrator::TrBdf2, History::Valid) => Method::TrBdf2,
         }
     }
 

@@ -26,7 +26,7 @@ impl Kernels {
         solver.rods.fit(&model);
         solver.motion.target.copy_from_slice(&state.position);
         solver.motion.target_frame.copy_from_slice(&state.orientation);
-        crate::row::couple::zones(&mut solver.rods.ranges, &solver.rows);
+        crate::row::system::zones(&mut solver.rods.ranges, &solver.rows);
         Kernels { model, state, solver }
     }
     /// Residual and Hessian.

@@ -13,7 +13,7 @@ use crate::model::Model;
 use crate::motion::Motion;
 use crate::rod::assemble::{Hessian, assemble};
 use crate::rod::brake;
-use crate::rod::freedom::Freedom;
+use crate::rod::constraint::NodeConstraint;
 use crate::rod::length::LENGTH_TOLERANCE;
 use crate::rod::scratch::RodScratch;
 use crate::row::{self, Rows};
@@ -72,7 +72,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
     let settings = &model.settings;
     let Solver { motion, rods, candidates, rows, effort } = solver;
     rods.begin(model, state, motion);
-    row::couple::begin(rows);
+    row::system::begin(rows);
     let mut out = Outcome { converged: false, finite: true, iterations: 0, turn: 0.0, residual: 0.0 };
     // Once indefinite, mostly indefinite: a substep tries the exact matrix until it fails. Without contacts the other
     // one mostly is as good, so the exact one has to wait until it is not.
@@ -91,9 +91,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         out.iterations += 1;
         effort.now +=
             600.0 * model.mass.len() as f64 + 200.0 * (candidates.threads.len() + candidates.shapes.len()) as f64;
-        row::shape::review(model, state, motion, rows, out.iterations == 1);
+        row::shape::update_active_set(model, state, motion, rows, out.iterations == 1);
         brake::review(model, state, &mut rods.brakes);
-        row::couple::zones(&mut rods.ranges, rows);
+        row::system::zones(&mut rods.ranges, rows);
         let first = out.iterations == 1;
         let mut taken = 1.0;
         loop {
@@ -122,7 +122,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             torque_correction.apply(system, rod, zone, &motion.torque, step);
         }
         rows.border.couple(&mut rods.step, false);
-        row::couple::couple(state, motion, rods, rows, effort);
+        row::system::solve(state, motion, rods, rows, effort);
         row::follow::follow(rods, rows, effort);
         gained = work(rods, rows) - rods.work_built_up(model, state);
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
@@ -163,7 +163,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             && rods.length_error(model, state) <= LENGTH_TOLERANCE
             && rows.solved()
             && brake::settled(model, state, &rods.brakes)
-            && row::shape::settled(model, state, motion, rows, &rods.step, out.iterations)
+            && row::shape::converged(model, state, motion, rows, &rods.step, out.iterations)
             && !row::extend(model, state, motion, candidates, rows)
         {
             out.converged = true;
@@ -176,7 +176,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
 /// Work of the forces at the iterate, contact forces as last found, along the last step.
 fn work(rods: &RodScratch, rows: &Rows) -> f64 {
     let own: f64 = rods.rhs.iter().zip(&rods.step).map(|(r, z)| r.dot(*z)).sum();
-    own + row::couple::work(rows, &rods.step) + rows.border.work()
+    own + row::system::work(rows, &rods.step) + rows.border.work()
 }
 
 /// Assembles and factors. False when a pivot is not positive.
@@ -194,26 +194,26 @@ pub(crate) fn factor(
     rows.welds.assemble_joints(state, &mut rods.rhs, &mut rods.system.diagonal);
     row::weld::gather(model, state, rods, rows, hessian == Hessian::Exact);
     restrict(state, rods);
-    let RodScratch { system, ranges, freedom, .. } = rods;
+    let RodScratch { system, ranges, constraint, .. } = rods;
     let mut positive = true;
     for (rod, zone) in ranges.iter() {
         positive &= system.factor(rod.clone(), zone);
     }
-    rows.border.factor(system, ranges, freedom) && positive
+    rows.border.factor(system, ranges, constraint) && positive
 }
 
 /// Takes held nodes out of the system and puts the drive on guided ones.
 fn restrict(state: &State, rods: &mut RodScratch) {
-    for node in 0..rods.freedom.len() {
-        let freedom = rods.freedom[node];
-        if freedom == Freedom::Free {
+    for node in 0..rods.constraint.len() {
+        let constraint = rods.constraint[node];
+        if constraint == NodeConstraint::Free {
             continue;
         }
-        if let Some((stiffness, force)) = freedom.drive(state.position[node / 2]) {
+        if let Some((stiffness, force)) = constraint.drive(state.position[node / 2]) {
             rods.system.diagonal[node] += stiffness;
             rods.rhs[node] += force;
         }
-        let keep = freedom.projector();
+        let keep = constraint.projector();
         rods.system.restrict(node, keep);
         rods.rhs[node] = keep * rods.rhs[node];
     }

@@ -240,7 +240,7 @@ pub(crate) const SLIP: f64 = 1e-3;
 pub(crate) const AT_LIMIT: f64 = 0.9999;
 
 /// Most slip that the next substep is left to undo, in radii.
-pub(crate) const DRIFT_MOST: f64 = 0.1;
+pub(crate) const RESIDUAL_SLIP_MOST: f64 = 0.1;
 
 /// Multiplications that a contact solve may spend; large ones get a third of the cube of their unknowns, two
 /// factorizations. (One that is cut short has friction that does not hold yet: in a rope of threads that feeds itself

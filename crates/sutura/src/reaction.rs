@@ -74,7 +74,7 @@ fn unbalanced(model: &Model, state: &State, solver: &mut Solver, h: f64) {
     assemble_clamps(state, rods);
     rows.welds.assemble_joints(state, &mut rods.rhs, &mut rods.system.diagonal);
     row::shape::assemble(model, state, motion, rods, rows, false);
-    row::couple::add_forces(rows, &mut rods.rhs);
+    row::system::add_forces(rows, &mut rods.rhs);
 }
 
 fn unbalanced_blocks(

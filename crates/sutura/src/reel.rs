@@ -29,19 +29,19 @@ impl ReelState {
 }
 
 /// Feeds the length of a substep at its start. True where there are reels: weights are others then.
-pub(crate) fn turn(model: &mut Model, state: &mut State, h: f64) -> bool {
+pub(crate) fn feed(model: &mut Model, state: &mut State, h: f64) -> bool {
     let State { reels, loads, rest_length, .. } = state;
     for (_, reel) in reels.iter_mut() {
         if let ReelLaw::Rate(rate) = reel.law {
             reel.feed(model, rest_length, loads, rate * h);
         }
     }
-    follow(model, state);
+    sync(model, state);
     state.reels.iter().next().is_some()
 }
 
 /// Gives off what brakes let slip in a substep.
-pub(crate) fn pay_out(model: &mut Model, state: &mut State, brakes: &[Brake]) {
+pub(crate) fn release(model: &mut Model, state: &mut State, brakes: &[Brake]) {
     for brake in brakes.iter().filter(|b| b.slips) {
         let paid = brake.paid(model, state);
         let State { reels, loads, rest_length, .. } = &mut *state;
@@ -50,7 +50,7 @@ pub(crate) fn pay_out(model: &mut Model, state: &mut State, brakes: &[Brake]) {
         }
     }
     if !brakes.is_empty() {
-        follow(model, state);
+        sync(model, state);
     }
 }
 
@@ -75,7 +75,7 @@ impl ReelState {
 }
 
 /// Makes the model's elements at reels as long as the state says.
-pub(crate) fn follow(model: &mut Model, state: &State) {
+pub(crate) fn sync(model: &mut Model, state: &State) {
     for (_, reel) in state.reels.iter() {
         let e = reel.element(model);
         if model.rest_length[e] != state.rest_length[e] {
@@ -92,7 +92,7 @@ pub(crate) fn follow(model: &mut Model, state: &State) {
 
 /// Cuts and joins elements at reels, with regard to what the next `h` draws back. True when there is another number of
 /// them now.
-pub(crate) fn renumber(model: &mut Model, state: &mut State, h: f64) -> bool {
+pub(crate) fn remesh(model: &mut Model, state: &mut State, h: f64) -> bool {
     let mut changed = false;
     for slot in 0..state.reels.len() as u32 {
         // What a substep feeds in is cut before the next one.
@@ -433,8 +433,8 @@ mod tests {
         world.insert_reel(&ReelSpec { rod, at_end: false, law: ReelLaw::Rate(0.0), supply: None }).unwrap();
         let (mut model, mut state) = world.into_parts();
         state.rest_length[0] = 1e88;
-        follow(&mut model, &state);
-        renumber(&mut model, &mut state, 1e-3);
+        sync(&mut model, &state);
+        remesh(&mut model, &mut state, 1e-3);
         assert!(state.rest_length[..10].iter().all(|l| *l > 0.0));
     }
 
@@ -452,7 +452,7 @@ mod tests {
             normal: DVec3::Z,
             normal_force: 1.0,
             friction: DVec3::ZERO,
-            drift: DVec3::ZERO,
+            residual_slip: DVec3::ZERO,
             sliding: false,
         };
         let place = |element: u32, s: f64| Site::Thread { element, s };
@@ -467,12 +467,12 @@ mod tests {
             assert!(shapes.is_sorted_by_key(|c| c.on_shape().unwrap()), "{shapes:?}");
         };
         state.rest_length[0] *= 1.7;
-        follow(&mut model, &state);
-        assert!(renumber(&mut model, &mut state, 1e-3));
+        sync(&mut model, &state);
+        assert!(remesh(&mut model, &mut state, 1e-3));
         in_order(&state);
         state.rest_length[0] *= 0.5;
-        follow(&mut model, &state);
-        assert!(renumber(&mut model, &mut state, 1e-3));
+        sync(&mut model, &state);
+        assert!(remesh(&mut model, &mut state, 1e-3));
         in_order(&state);
         let pairs: Vec<_> = state.contacts.threads().iter().filter_map(Contact::elements).collect();
         assert_eq!(pairs, [(0, 5), (0, 6), (1, 5)]);

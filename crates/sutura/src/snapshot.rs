@@ -8,7 +8,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{Contact, Contacts, GripState, LoadState, Onset, ReelState, Site, State};
+use crate::state::{Contact, Contacts, GripState, History, LoadState, ReelState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
@@ -180,7 +180,7 @@ macro_rules! variants {
 pub(crate) use {structure, variants};
 
 variants!(ReelLaw { 0 => Rate(rate), 1 => Brake(force) });
-variants!(Onset { 0 => Unknown, 1 => Broken, 2 => Smooth });
+variants!(History { 0 => Unknown, 1 => Discontinuous, 2 => Valid });
 variants!(Hold { 0 => Pin, 1 => Clamp, 2 => Jaw });
 variants!(Drive { 0 => Pose, 1 => Force { direction, force, speed_limit }, 2 => Hand { direction, force, speed_limit } });
 variants!(Place { 0 => Start, 1 => End, 2 => Particle(i), 3 => Element(e), 4 => Arc(s) });
@@ -212,7 +212,7 @@ structure!(GripState {
 structure!(State {
     time,
     last_h,
-    calm,
+    accepted_in_row,
     rest_length,
     position,
     velocity,
@@ -220,7 +220,7 @@ structure!(State {
     angular_velocity,
     acceleration,
     angular_acceleration,
-    onset,
+    history,
     tension,
     plastic,
     hardened,
@@ -238,7 +238,7 @@ impl Bytes for Contacts {
     fn put(&self, out: &mut Vec<u8>) {
         let rest = |c: &Contact, out: &mut Vec<u8>| {
             (c.normal, c.normal_force).put(out);
-            (c.friction, c.drift).put(out);
+            (c.friction, c.residual_slip).put(out);
             c.sliding.put(out);
         };
         (self.threads().len() as u64).put(out);
@@ -258,14 +258,8 @@ impl Bytes for Contacts {
     }
     fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
         type Rest = ((DVec3, f64), ((DVec3, DVec3), bool));
-        let contact = |a: Site, b: Site, ((normal, normal_force), ((friction, drift), sliding)): Rest| Contact {
-            a,
-            b,
-            normal,
-            normal_force,
-            friction,
-            drift,
-            sliding,
+        let contact = |a: Site, b: Site, ((normal, normal_force), ((friction, residual_slip), sliding)): Rest| {
+            Contact { a, b, normal, normal_force, friction, residual_slip, sliding }
         };
         let threads = Vec::<(((u32, u32), (f64, f64)), Rest)>::take(input)?;
         let shapes = Vec::<(((u32, u32), f64), Rest)>::take(input)?;

@@ -15,7 +15,7 @@ use crate::rod::length::{TAUT, UNBEARABLE, let_stretch, off_length, tautest};
 use crate::rod::plastic::yield_plastic;
 use crate::row;
 use crate::scratch::Scratch;
-use crate::state::{Onset, State};
+use crate::state::{History, State};
 use crate::view::View;
 use glam::DVec3;
 
@@ -91,9 +91,9 @@ impl Step<'_, '_> {
         let allowed = self.model.step_work.filter(|_| !starved).unwrap_or(f64::INFINITY);
         self.scratch.solver.effort.begin(allowed);
         let whole = (0..n as u32).all(|k| {
-            if reel::renumber(self.model, self.state, h) {
+            if reel::remesh(self.model, self.state, h) {
                 self.scratch.fit(self.model);
-                self.state.interrupt(Onset::Unknown);
+                self.state.invalidate(History::Unknown);
                 // Who looks from state to state must not lose sight of the motion to come.
                 (self.interval.observe)(View { model: self.model, state: self.state });
             }
@@ -124,7 +124,7 @@ impl Step<'_, '_> {
         // Where substeps had to be short a while ago they start short.
         if sub.depth < self.model.settings.halvings
             && last_h > 0.0
-            && sub.h > last_h * if self.state.calm < CALM { 1.5 } else { 3.0 }
+            && sub.h > last_h * if self.state.accepted_in_row < CALM { 1.5 } else { 3.0 }
         {
             return self.halves(sub);
         }
@@ -136,12 +136,12 @@ impl Step<'_, '_> {
             return false;
         }
         self.scratch.saved.save(sub.depth, self.state);
-        let reels = reel::turn(self.model, self.state, sub.h);
+        let reels = reel::feed(self.model, self.state, sub.h);
         if reels {
             outside_forces(self.model, self.state, &mut self.scratch.solver.motion);
         }
         // Length that comes in has no past to go by.
-        let mut method = if reels { Method::Euler } else { Method::of(self.model, self.state.onset, sub.h) };
+        let mut method = if reels { Method::Euler } else { Method::of(self.model, self.state.history, sub.h) };
         let mut attempt = self.attempt(sub, method);
         if attempt.too_coarse {
             // What stops or jumps has no second derivative to go by, and would bounce; what turns too far in a substep
@@ -170,9 +170,9 @@ impl Step<'_, '_> {
         let Step { model, state, scratch, report, .. } = self;
         if model.settings.integrator == Integrator::TrBdf2 {
             if reels || method == Method::Euler && touches_anew(scratch.saved.at(sub.depth), state) {
-                state.interrupt(Onset::Broken);
+                state.invalidate(History::Discontinuous);
             } else {
-                state.onset = Onset::Smooth;
+                state.history = History::Valid;
             }
         }
         if scratch.held.is_empty() {
@@ -180,7 +180,7 @@ impl Step<'_, '_> {
         }
         let last_h = state.last_h;
         state.last_h = if sub.depth == 0 { 0.0 } else { sub.h };
-        state.calm = if sub.h > 1.5 * last_h { 0 } else { state.calm.saturating_add(1) };
+        state.accepted_in_row = if sub.h > 1.5 * last_h { 0 } else { state.accepted_in_row.saturating_add(1) };
         state.time = sub.t + sub.h;
         report.substeps += 1;
         report.residual = report.residual.max(outcome.residual);
@@ -198,13 +198,13 @@ impl Step<'_, '_> {
     fn retry(&mut self, sub: Substep, refused: Refused, before: f64) -> bool {
         self.report.rejected += 1;
         self.scratch.saved.restore(sub.depth, self.state);
-        reel::follow(self.model, self.state);
+        reel::sync(self.model, self.state);
         let Step { model, state, scratch, report, .. } = self;
         let effort = &mut scratch.solver.effort;
         let last = sub.depth >= model.settings.halvings || effort.exhausted();
         if effort.late() {
             if report.substeps == 0 || effort.sum() - before > TOO_LONG * effort.allowed {
-                (state.last_h, state.calm) = (0.5 * sub.h, 0);
+                (state.last_h, state.accepted_in_row) = (0.5 * sub.h, 0);
             }
             effort.cut = true;
             return false;
@@ -213,7 +213,7 @@ impl Step<'_, '_> {
         if let_stretch(model, state, &mut scratch.solver.rods, taut) {
             return self.advance(sub);
         }
-        (state.last_h, state.calm) = (0.5 * sub.h, 0);
+        (state.last_h, state.accepted_in_row) = (0.5 * sub.h, 0);
         if !last {
             return self.halves(sub);
         }
@@ -222,7 +222,7 @@ impl Step<'_, '_> {
         if let Some(rods) = hold_refused(model, scratch, refused, sub.t) {
             let kind = IncidentKind::Held { reason, rods: rods.map(|r| model.rods.handle(r)) };
             report.incidents.push(Incident { time: sub.t, kind });
-            (state.last_h, state.calm) = (0.0, 0);
+            (state.last_h, state.accepted_in_row) = (0.0, 0);
             return self.advance(sub);
         }
         let kind =
@@ -232,7 +232,7 @@ impl Step<'_, '_> {
         // Rest: what moved into this state must not push again.
         state.velocity.fill(DVec3::ZERO);
         state.angular_velocity.fill(DVec3::ZERO);
-        state.interrupt(Onset::Unknown);
+        state.invalidate(History::Unknown);
         false
     }
 
@@ -247,11 +247,11 @@ impl Step<'_, '_> {
             let begun = Begun { began: sub.t, h: sub.h, stage: &stage, origin };
             predict(model, state, solver, interval, &begun, held);
             collide::detect(model, state, &solver.motion, &mut solver.candidates);
-            row::begin(model, state, &solver.motion, &solver.candidates, &mut solver.rows, stage.length());
+            row::prepare(model, state, &solver.motion, &solver.candidates, &mut solver.rows, stage.length());
             let outcome = newton::solve(model, state, solver, stage.span, sub.depth == halvings);
             report.newton_iterations += outcome.iterations;
             let verdict = judge(model, state, solver, &outcome, sub.depth == halvings).and_then(|clearance| {
-                reel::pay_out(model, state, &solver.rods.brakes);
+                reel::release(model, state, &solver.rods.brakes);
                 complete(model, state, solver, &stage, sub.h);
                 let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
                 if clear && all_finite(model, state) { Ok(clearance) } else { Err(Rejection::NotFinite.into()) }

@@ -59,8 +59,8 @@ impl<'a> WeldView<'a> {
         self.weld.members.iter().map(|m| (m.rod as usize, m.particle as usize))
     }
     /// Elements of the joined threads whose way to each other through the weld is shorter than this do not touch \[m\].
-    pub fn exempt(&self) -> f64 {
-        self.weld.exempt
+    pub fn filter_distance(&self) -> f64 {
+        self.weld.filter_distance
     }
 }
 

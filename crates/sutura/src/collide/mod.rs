@@ -93,7 +93,7 @@ fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> 
         || model
             .welds
             .iter()
-            .any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.exempt)
+            .any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.filter_distance)
 }
 
 /// Rest arc between an element and a weld along its own thread; infinite where that is not joined there.
@@ -107,7 +107,7 @@ fn way_to_weld(model: &Model, arc: &[f64], weld: &WeldModel, e: usize) -> f64 {
 
 /// Up to which way through a new weld elements of its threads do not touch: less than half a turn, or as far as they
 /// overlap there now because they run into each other at an acute angle.
-pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
+pub(crate) fn filter_distance(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
     // Where legs that meet at an angle a are a diameter apart they are r / sin(a / 2) long: 40 radii at 3 degrees.
     const FARTHEST: f64 = 40.0;
     let mut arc = Vec::new();
@@ -115,7 +115,7 @@ pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
     let radius = |e: usize| model.rods.at(model.rod_of[e]).map_or(0.0, |r| r.radius);
     let near = |e: &usize| model.is_element(*e) && way_to_weld(model, &arc, weld, *e) < FARTHEST * radius(*e);
     let legs: Vec<usize> = (0..model.mass.len()).filter(near).collect();
-    let mut exempt = weld.exempt;
+    let mut filter_distance = weld.filter_distance;
     for (k, a) in legs.iter().enumerate() {
         for b in &legs[k + 1..] {
             let own =
@@ -123,11 +123,11 @@ pub(crate) fn exempt(model: &Model, x: &[DVec3], weld: &WeldModel) -> f64 {
             let apart = segment::closest(x[*a], x[*a + 1], x[*b], x[*b + 1]).apart.length();
             if !own && apart < (radius(*a) + radius(*b)) * (1.0 + params::KEEP) {
                 let way = way_to_weld(model, &arc, weld, *a) + way_to_weld(model, &arc, weld, *b);
-                exempt = exempt.max(way + 0.01 * radius(*a));
+                filter_distance = filter_distance.max(way + 0.01 * radius(*a));
             }
         }
     }
-    exempt
+    filter_distance
 }
 
 /// Rest arc of each particle from the start of its rod.

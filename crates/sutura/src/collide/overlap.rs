@@ -144,7 +144,8 @@ impl Seen<'_> {
                 let along = model.rod_of[a] == model.rod_of[b]
                     && arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] + room;
                 let fork = |w: &crate::model::weld::WeldModel| {
-                    super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b) < w.exempt + room
+                    super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b)
+                        < w.filter_distance + room
                 };
                 let fold = along || model.welds.iter().any(|(_, w)| fork(w));
                 pairs.insert((a, b), Pair { a, b, s: c.s, t: c.t, apart, fold });

@@ -44,6 +44,7 @@ pub enum Hold {
 
 /// What moves a grip.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Drive {
     /// A pose set by the user ([`World::set_grip_pose`](crate::World::set_grip_pose)); where it is when taken, until
     /// then.

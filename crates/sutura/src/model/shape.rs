@@ -67,6 +67,7 @@ pub enum Geometry {
 
 /// What moves a shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum ShapeMotion {
     /// Nothing, ever.
     Fixed,

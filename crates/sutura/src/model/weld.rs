@@ -38,7 +38,7 @@ pub enum WeldRest {
 pub(crate) struct WeldModel {
     pub members: Vec<Member>,
     /// Elements of joined threads that are nearer to each other by way of the weld than this do not touch \[m\].
-    pub exempt: f64,
+    pub filter_distance: f64,
 }
 
 /// A thread at a weld.

@@ -18,7 +18,7 @@ use crate::model::shape::ShapeMotion;
 use crate::motion;
 use crate::params::PaperSettings;
 use crate::report::{Incident, IncidentKind, StepReport};
-use crate::state::{Onset, State};
+use crate::state::{History, State};
 use crate::view::View;
 use constraints::{BendTwist, StretchShear};
 use contact::{Contacts, Motion};
@@ -268,6 +268,6 @@ fn leave_rates(model: &Model, state: &mut State, motion: &motion::Motion, h: f64
     for (_, grip) in state.grips.iter_mut() {
         (grip.force, grip.torque) = (DVec3::ZERO, DVec3::ZERO);
     }
-    (state.last_h, state.calm) = (0.0, 0);
-    state.interrupt(Onset::Unknown);
+    (state.last_h, state.accepted_in_row) = (0.0, 0);
+    state.invalidate(History::Unknown);
 }

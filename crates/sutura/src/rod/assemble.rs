@@ -4,7 +4,7 @@ use crate::lanes::{Quat2, Sym2, Vec2, join, lanes};
 use crate::math::log;
 use crate::model::Model;
 use crate::motion::Motion;
-use crate::rod::freedom::ClampJoint;
+use crate::rod::constraint::ClampJoint;
 use crate::rod::scratch::RodScratch;
 use crate::rod::strain;
 use crate::state::State;

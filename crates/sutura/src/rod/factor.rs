@@ -141,7 +141,7 @@ impl Block {
 struct Link {
     /// `l^-1` of its coupling to that particle.
     own: DVec3,
-    /// Coupling to the two nodes that come after, when the particle is eliminated.
+    /// ContactSystem to the two nodes that come after, when the particle is eliminated.
     next: DVec3,
     after: DVec3,
     /// Minus the reciprocal of its pivot.
@@ -172,12 +172,12 @@ impl Link {
 #[derive(Default)]
 pub(crate) struct System {
     pub diagonal: Vec<DMat3>,
-    /// Coupling of each node to the next one and to the one after it: `a[k][k + 1]`, `a[k][k + 2]`.
+    /// ContactSystem of each node to the next one and to the one after it: `a[k][k + 1]`, `a[k][k + 2]`.
     pub next: Vec<DMat3>,
     pub after: Vec<DMat3>,
     /// Whether a block is one of a rod whose elements have multipliers.
     pub tied: Vec<bool>,
-    /// Coupling of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has
+    /// ContactSystem of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has
     /// none.
     pub ties: Vec<([DVec3; 2], f64)>,
     /// Right side of each multiplier's row.

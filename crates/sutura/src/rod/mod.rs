@@ -2,9 +2,10 @@
 
 pub(crate) mod assemble;
 pub(crate) mod brake;
+pub(crate) mod constraint;
 pub(crate) mod energy;
 pub(crate) mod factor;
-pub(crate) mod freedom;
+
 pub(crate) mod length;
 pub(crate) mod plastic;
 pub(crate) mod scratch;

@@ -2,8 +2,8 @@
 
 use crate::model::Model;
 use crate::rod::brake::Brake;
+use crate::rod::constraint::{ClampJoint, NodeConstraint};
 use crate::rod::factor::System;
-use crate::rod::freedom::{ClampJoint, Freedom};
 use crate::rod::torque::TorqueCorrection;
 use core::ops::Range;
 use glam::{DVec2, DVec3};
@@ -14,7 +14,7 @@ pub(crate) struct RodScratch {
     /// Blocks of each living rod, and the zone of its contacts.
     pub ranges: Vec<(Range<usize>, Range<usize>)>,
     /// One per node.
-    pub freedom: Vec<Freedom>,
+    pub constraint: Vec<NodeConstraint>,
     pub joint_on: Vec<bool>,
     pub clamps: Vec<ClampJoint>,
     pub brakes: Vec<Brake>,
@@ -42,7 +42,7 @@ impl RodScratch {
     /// Makes room for the model's arrays. Inextensible threads keep their length again.
     pub fn fit(&mut self, model: &Model) {
         let n = model.mass.len();
-        self.freedom.resize(2 * n, Freedom::Free);
+        self.constraint.resize(2 * n, NodeConstraint::Free);
         self.joint_on.resize(n, true);
         self.system.resize(n);
         self.rhs.resize(2 * n, DVec3::ZERO);

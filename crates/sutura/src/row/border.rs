@@ -10,8 +10,8 @@
 //! unknown is and which forces act on it is in [`movers`](crate::row::movers) and [`weld`](crate::row::weld).
 
 use crate::math::solve_dense;
+use crate::rod::constraint::NodeConstraint;
 use crate::rod::factor::System;
-use crate::rod::freedom::Freedom;
 use crate::row::ldl::Ldl;
 use core::ops::Range;
 use glam::DVec3;
@@ -121,14 +121,19 @@ impl Border {
 
     /// Takes what is held out of B and finds the responses; the rods' system is factored. False when the whole is not
     /// positive definite.
-    pub fn factor(&mut self, system: &System, rods: &[(Range<usize>, Range<usize>)], freedom: &[Freedom]) -> bool {
+    pub fn factor(
+        &mut self,
+        system: &System,
+        rods: &[(Range<usize>, Range<usize>)],
+        constraint: &[NodeConstraint],
+    ) -> bool {
         let n = self.count;
         for c in &mut self.columns[..n] {
             c.response.clear();
-            c.response.resize(freedom.len(), DVec3::ZERO);
+            c.response.resize(constraint.len(), DVec3::ZERO);
             for (node, v) in &mut c.links {
-                if freedom[*node] != Freedom::Free {
-                    *v = freedom[*node].projector() * *v;
+                if constraint[*node] != NodeConstraint::Free {
+                    *v = constraint[*node].projector() * *v;
                 }
                 c.response[*node] += *v;
             }

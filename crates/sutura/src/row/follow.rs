@@ -16,7 +16,7 @@
 
 use crate::effort::Effort;
 use crate::rod::scratch::RodScratch;
-use crate::row::{Rows, couple};
+use crate::row::{Rows, system};
 use glam::DVec3;
 
 /// Products after which GMRES ends.
@@ -76,7 +76,7 @@ impl Follow {
             }
             // The contacts find their forces anew, and the step takes up both.
             self.push(rods, rows);
-            couple::again(rods, rows, effort, &mut self.step);
+            system::again(rods, rows, effort, &mut self.step);
         }
     }
 
@@ -95,7 +95,7 @@ impl Follow {
         self.push(rods, rows);
         self.border.clear();
         rows.border.swap_steps(&mut self.border);
-        couple::pressed_response(rods, rows, effort, &mut self.step);
+        system::pressed_response(rods, rows, effort, &mut self.step);
         for ((k, v), active) in self.rows.iter().zip(&mut self.change).zip(&self.active) {
             if *active {
                 *v -= rows.shapes[*k as usize].gained(&self.step, &rows.movers, &rows.border);

@@ -2,9 +2,8 @@
 //! ([`shape`]: firm in the rods' matrix, light in the small problem). And what rods share, at the [`border`] of their
 //! system: pushed shapes and welds.
 
+pub(crate) mod active_set;
 pub(crate) mod border;
-pub(crate) mod cone;
-pub(crate) mod couple;
 pub(crate) mod delassus;
 pub(crate) mod dense;
 pub(crate) mod follow;
@@ -13,6 +12,7 @@ pub(crate) mod movers;
 pub(crate) mod shape;
 pub(crate) mod side;
 pub(crate) mod sparse;
+pub(crate) mod system;
 pub(crate) mod thread;
 pub(crate) mod weld;
 
@@ -30,7 +30,7 @@ pub(crate) struct Rows {
     pub movers: movers::Movers,
     pub welds: weld::Welds,
     pub border: border::Border,
-    pub solver: couple::Coupling,
+    pub solver: system::ContactSystem,
     pub follow: follow::Follow,
     fresh: Vec<thread::ThreadRow>,
     fresh_shapes: Vec<shape::ShapeRow>,
@@ -65,7 +65,7 @@ impl Pressed for Rows {
 }
 
 /// Collects the rows of a solve of this length and gives them the forces of the last one.
-pub(crate) fn begin(
+pub(crate) fn prepare(
     model: &Model,
     state: &State,
     motion: &Motion,
@@ -73,8 +73,8 @@ pub(crate) fn begin(
     rows: &mut Rows,
     length: f64,
 ) {
-    thread::begin(model, state, motion, candidates, rows);
-    shape::begin(model, state, motion, candidates, rows, length);
+    thread::prepare(model, state, motion, candidates, rows);
+    shape::prepare(model, state, motion, candidates, rows, length);
 }
 
 /// Adds rows that the iterate calls for. Whether there are any.

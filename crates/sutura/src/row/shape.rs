@@ -4,10 +4,10 @@
 //!
 //! A row that bore a firm load is a spring in the rods' own matrix: cost is linear in the number of such rows. All
 //! others (light ones, those that touch, lift off or lie much deeper than their force says) enter the small contact
-//! problem ([`couple`]), which decides all of them at once; Newton alone would switch them on and off from one
+//! problem ([`system`]), which decides all of them at once; Newton alone would switch them on and off from one
 //! iteration to the next.
 //!
-//! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the
+//! Friction is a tangential spring from the friction_before of the last substep (Cundall and Strack 1979), as stiff as the
 //! normal one: while the trial force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep;
 //! beyond, the force stays on the disc. Both forces act at the centerline.
 //! The friction of rows that slide follows their normal forces within each iteration ([`follow`](crate::row::follow)).
@@ -20,7 +20,7 @@
 //! A row that slides by more than a trace has the kinetic coefficient in the next substep. Within a substep there is
 //! one coefficient, or evening out forces between contacts that together hold would set them off one after the other.
 //!
-//! [`couple`]: crate::row::couple
+//! [`system`]: crate::row::system
 
 use crate::collide::{Candidates, Pressed};
 use crate::math::{Pose, outer};
@@ -32,9 +32,9 @@ use crate::params;
 use crate::rod::scratch::RodScratch;
 use crate::row::Rows;
 use crate::row::border::Border;
-use crate::row::couple::{Entry, Source, regain};
 use crate::row::movers::Movers;
 use crate::row::side::{Endpoint, Side};
+use crate::row::system::{Entry, Source, regain};
 use crate::state::{Contact, Site, State};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -57,12 +57,12 @@ pub(crate) struct ShapeRow {
     /// In the rods' matrix, not in the small problem.
     firm: bool,
     /// Left out of the small problem, it was violated.
-    wanted: bool,
+    activate: bool,
     /// Friction force at the start of the substep, in the tangent plane then, and slip that was still to be undone.
-    anchor: DVec3,
-    drift: DVec3,
-    /// Compliance with which it last entered the small problem \[m/N\].
-    entered: f64,
+    friction_before: DVec3,
+    residual_slip: DVec3,
+    /// Compliance with which it last effective_compliance the small problem \[m/N\].
+    effective_compliance: f64,
     /// Direction of the element, and, between its particles, that of the thread as a smooth curve.
     along: DVec3,
     smooth: Option<DVec3>,
@@ -77,7 +77,7 @@ pub(crate) struct ShapeRow {
     start_gap: f64,
     next_gap: f64,
     /// Normal force at the start.
-    carried: f64,
+    force_before: f64,
     /// Force on the thread at the last look (firm) or of the last solution.
     pub normal_force: f64,
     friction: DVec3,
@@ -92,7 +92,7 @@ pub(crate) struct ShapeRow {
     stops: u32,
     /// Stiffness of a firm row as last assembled, and the force that the step after it predicted.
     tangent: DMat3,
-    expected: DVec3,
+    predicted_force: DVec3,
 }
 
 /// What the friction of a firm row does, with the direction of its force.
@@ -119,7 +119,7 @@ const SHARP_BULGE: f64 = 0.004;
 
 impl ShapeRow {
     /// Its element, when it may enter the small problem.
-    pub fn entering(&self) -> Option<usize> {
+    pub fn compliant_element(&self) -> Option<usize> {
         (!self.firm).then_some(self.element as usize)
     }
 
@@ -149,12 +149,12 @@ impl ShapeRow {
     fn receive(&mut self, c: &Contact) {
         let across = |v: DVec3| v - self.normal * self.normal.dot(v);
         self.sliding |= c.sliding;
-        self.drift = across(c.drift);
-        self.carried += c.normal_force;
-        self.normal_force = self.carried;
-        self.anchor += across(c.friction);
-        self.friction = self.anchor;
-        self.firm = self.carried > self.least;
+        self.residual_slip = across(c.residual_slip);
+        self.force_before += c.normal_force;
+        self.normal_force = self.force_before;
+        self.friction_before += across(c.friction);
+        self.friction = self.friction_before;
+        self.firm = self.force_before > self.least;
         self.mode = Some(self.friction)
             .filter(|_| self.sliding)
             .and_then(DVec3::try_normalize)
@@ -285,10 +285,10 @@ impl Pair<'_> {
             mu: [friction.stick, friction.slide],
             sliding: false,
             firm: false,
-            wanted: false,
-            anchor: DVec3::ZERO,
-            drift: DVec3::ZERO,
-            entered: 0.0,
+            activate: false,
+            friction_before: DVec3::ZERO,
+            residual_slip: DVec3::ZERO,
+            effective_compliance: 0.0,
             along: (self.start[e + 1] - self.start[e]).normalize_or_zero(),
             smooth,
             beside_edge: false,
@@ -297,7 +297,7 @@ impl Pair<'_> {
             before,
             start_gap: gap,
             next_gap: gap + now.value - before.value - before.normal.dot(self.pushed),
-            carried: 0.0,
+            force_before: 0.0,
             normal_force: 0.0,
             friction: DVec3::ZERO,
             mode: Mode::Sticks,
@@ -306,13 +306,13 @@ impl Pair<'_> {
             stops: 0,
             pressed: 0.0,
             tangent: DMat3::ZERO,
-            expected: DVec3::ZERO,
+            predicted_force: DVec3::ZERO,
         }
     }
 }
 
 /// Collects the rows of the substep and gives them the forces of the last one.
-pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows, h: f64) {
+pub(crate) fn prepare(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows, h: f64) {
     let Motion { start, start_shape_pose, .. } = motion;
     let (rows, movers) = (&mut rows.shapes, &mut rows.movers);
     rows.clear();
@@ -453,7 +453,7 @@ fn between(rows: &[ShapeRow], shape: u32, from: f64, to: f64) -> Range<usize> {
     rows.partition_point(|r| r.key() < (shape, from))..rows.partition_point(|r| r.key() <= (shape, to))
 }
 
-/// Gives each old contact's force and anchor to the row on the same shape that is nearest to it along the thread, or on
+/// Gives each old contact's force and friction_before to the row on the same shape that is nearest to it along the thread, or on
 /// another one in its place: the half of a post that a thread touches now may be the other one.
 fn inherit(old: &[Contact], model: &Model, rows: &mut [ShapeRow]) {
     for c in old {
@@ -477,13 +477,13 @@ fn inherit(old: &[Contact], model: &Model, rows: &mut [ShapeRow]) {
 }
 
 /// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that
-/// is nearer now and next, or where they are alike the one that carried force. Both stay where one overtakes the other.
+/// is nearer now and next, or where they are alike the one that force_before force. Both stay where one overtakes the other.
 fn merge(rows: &mut Vec<ShapeRow>) {
     rows.sort_unstable_by(|a, b| {
         a.element
             .cmp(&b.element)
             .then(a.s.total_cmp(&b.s))
-            .then(b.carried.total_cmp(&a.carried))
+            .then(b.force_before.total_cmp(&a.force_before))
             .then(a.shape.cmp(&b.shape))
     });
     rows.dedup_by(|b, a| {
@@ -510,7 +510,7 @@ fn across(normal: DVec3, smooth: Option<DVec3>) -> DVec3 {
 }
 
 /// Looks where the row is now; its point on the centerline.
-fn look(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -> DVec3 {
+fn evaluate(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let shape = model.shapes.at(row.shape).expect("rows name living shapes");
     let p = state.position[e].lerp(state.position[e + 1], row.s);
@@ -528,38 +528,38 @@ fn look(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -> DV
 fn slip(state: &State, motion: &Motion, row: &ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
-    let carried = surface_motion(
+    let force_before = surface_motion(
         &motion.start_shape_pose[row.shape as usize],
         &state.shape_pose[row.shape as usize],
         p - n * row.radius,
     );
-    let slip = p - motion.start[e].lerp(motion.start[e + 1], row.s) - carried + row.drift;
+    let slip = p - motion.start[e].lerp(motion.start[e + 1], row.s) - force_before + row.residual_slip;
     slip - n * n.dot(slip)
 }
 
 /// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first
-/// iteration the row is linearized where it carried its force: Newton starts where velocity leads, which may be just
+/// iteration the row is linearized where it force_before its force: Newton starts where velocity leads, which may be just
 /// off the surface.
-fn press(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow, first: bool) -> DVec3 {
-    look(model, state, motion, row);
+fn evaluate_penalty(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow, first: bool) -> DVec3 {
+    evaluate(model, state, motion, row);
     let n = row.normal;
     let depth = (-row.gap).max(0.0);
     row.pressed = row.hardness * depth * depth;
-    if first && row.carried > row.pressed {
-        let carried = (row.carried / row.hardness).sqrt();
-        row.pressed = row.carried;
-        row.stiffness = 2.0 * row.hardness * carried;
-        row.normal_force = row.carried + row.stiffness * (-row.gap - carried);
+    if first && row.force_before > row.pressed {
+        let force_before = (row.force_before / row.hardness).sqrt();
+        row.pressed = row.force_before;
+        row.stiffness = 2.0 * row.hardness * force_before;
+        row.normal_force = row.force_before + row.stiffness * (-row.gap - force_before);
     } else {
         row.stiffness = 2.0 * row.hardness * depth;
         row.normal_force = row.pressed;
     }
-    row.anchor - n * n.dot(row.anchor) - slip(state, motion, row) * row.stiffness
+    row.friction_before - n * n.dot(row.friction_before) - slip(state, motion, row) * row.stiffness
 }
 
 /// What friction does at the iterate, going by what it did before. One that slid and would be pushed the other way has
 /// stopped.
-fn decide(row: &mut ShapeRow, trial: DVec3) {
+fn update_mode(row: &mut ShapeRow, trial: DVec3) {
     let (size, limit) = (trial.length(), row.mu() * row.pressed);
     let before = row.mode;
     row.mode = match row.mode {
@@ -593,19 +593,19 @@ fn forces(row: &mut ShapeRow, trial: DVec3) -> DMat3 {
 }
 
 /// Decides which firm rows slide, and takes those whose law is far from their linearization out of the rods' matrix.
-pub(crate) fn review(model: &Model, state: &State, motion: &Motion, rows: &mut Rows, first: bool) {
+pub(crate) fn update_active_set(model: &Model, state: &State, motion: &Motion, rows: &mut Rows, first: bool) {
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
         let before = *row;
-        let trial = press(model, state, motion, row, first);
+        let trial = evaluate_penalty(model, state, motion, row, first);
         // Much deeper than its force says, its law is far from the parabola's tangent. One that slides and stops by
         // turns may do so with another one for ever: the small problem decides all of them at once.
-        if row.gap < -3.0 * (row.carried / row.hardness).sqrt()
+        if row.gap < -3.0 * (row.force_before / row.hardness).sqrt()
             || row.normal_force <= 0.0 && !first
             || row.stops > RESTLESS
         {
             *row = ShapeRow { firm: false, ..before };
         } else {
-            decide(row, trial);
+            update_mode(row, trial);
         }
     }
 }
@@ -624,10 +624,10 @@ pub(crate) fn assemble(
     rows.movers.assemble(model, state, &motion.start_shape_pose, &mut rows.border);
     for row in &mut rows.shapes {
         if !row.firm {
-            look(model, state, motion, row);
+            evaluate(model, state, motion, row);
             continue;
         }
-        let trial = press(model, state, motion, row, first);
+        let trial = evaluate_penalty(model, state, motion, row, first);
         let stiffness = forces(row, trial);
         let e = row.element as usize;
         let (a, b) = (1.0 - row.s, row.s);
@@ -653,7 +653,7 @@ fn moved(row: &ShapeRow, step: &[DVec3], movers: &Movers, border: &Border) -> DV
 pub(crate) fn predict(rows: &mut Rows, step: &[DVec3], scale: f64) {
     let (movers, border) = (&rows.movers, &rows.border);
     for row in rows.shapes.iter_mut().filter(|r| r.firm) {
-        row.expected = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale)
+        row.predicted_force = row.normal * row.normal_force + row.friction + row.rim * (row.followed * scale)
             - row.tangent * moved(row, step, movers, border) * scale;
     }
 }
@@ -661,13 +661,18 @@ pub(crate) fn predict(rows: &mut Rows, step: &[DVec3], scale: f64) {
 /// Work along the last step of what the firm rows' forces now are beyond those that it predicted.
 pub(crate) fn work_unforeseen(rows: &Rows, step: &[DVec3]) -> f64 {
     let on = |row: &ShapeRow| {
-        (row.normal * row.normal_force + row.friction - row.expected).dot(moved(row, step, &rows.movers, &rows.border))
+        (row.normal * row.normal_force + row.friction - row.predicted_force).dot(moved(
+            row,
+            step,
+            &rows.movers,
+            &rows.border,
+        ))
     };
     rows.shapes.iter().filter(|r| r.firm).map(on).sum()
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(
+pub(crate) fn add_entries(
     state: &State,
     motion: &Motion,
     step: &[DVec3],
@@ -680,15 +685,16 @@ pub(crate) fn enter(
         let e = row.element as usize;
         let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, border);
         let gap = row.gap + row.normal.dot(moved);
-        if row.normal_force <= 0.0 && !row.wanted && gap > params::PRUNE * row.radius {
+        if row.normal_force <= 0.0 && !row.activate && gap > params::PRUNE * row.radius {
             (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
             continue;
         }
-        row.entered = row.compliance();
+        row.effective_compliance = row.compliance();
         let axes = row.axes();
         let [_, t1, t2] = axes;
-        let slip = slip(state, motion, row) + moved - row.anchor * row.entered;
-        let (allowed, normal) = regain(row.start_gap, (row.carried / row.hardness).sqrt(), row.entered);
+        let slip = slip(state, motion, row) + moved - row.friction_before * row.effective_compliance;
+        let (allowed, normal) =
+            regain(row.start_gap, (row.force_before / row.hardness).sqrt(), row.effective_compliance);
         let shape = movers.moves(row.shape).map_or(Side::Still, |moves| Side::Shared(moves.against(axes)));
         entries.push(Entry {
             source: Source::Shape(k as u32),
@@ -696,7 +702,7 @@ pub(crate) fn enter(
             sides: [Side::Chain(Endpoint::new(e, row.s, axes)), shape],
             free: DVec3::new(gap - allowed, slip.dot(t1), slip.dot(t2)),
             mu: row.mu(),
-            compliance: DVec3::new(normal, row.entered, row.entered),
+            compliance: DVec3::new(normal, row.effective_compliance, row.effective_compliance),
             radius: row.radius,
             force: DVec3::new(row.normal_force, row.friction.dot(t1), row.friction.dot(t2)),
         });
@@ -710,7 +716,7 @@ fn surface_motion(from: &Pose, to: &Pose, point: DVec3) -> DVec3 {
 
 /// Whether the iterate agrees with the forces that it was computed with: what the law says now against its
 /// linearization.
-pub(crate) fn settled(
+pub(crate) fn converged(
     model: &Model,
     state: &State,
     motion: &Motion,
@@ -726,8 +732,8 @@ pub(crate) fn settled(
         for row in rows {
             let mut now = *row;
             if row.firm {
-                let trial = press(model, state, motion, &mut now, false);
-                decide(&mut now, trial);
+                let trial = evaluate_penalty(model, state, motion, &mut now, false);
+                update_mode(&mut now, trial);
                 forces(&mut now, trial);
                 // The step counted on the spring of a row that sticks, also a little beyond its limit: it slides in the
                 // next substep.
@@ -739,9 +745,9 @@ pub(crate) fn settled(
                     iterations > params::FRONT && moved(row, step, movers, border).length() < params::SLIP * row.radius;
                 settled &= off <= params::OFF_BALANCE * largest || front;
             } else if row.normal_force <= 0.0 {
-                look(model, state, motion, &mut now);
+                evaluate(model, state, motion, &mut now);
                 if now.gap < row.start_gap.min(0.0) - params::SLACK * row.radius {
-                    (row.wanted, settled) = (true, false);
+                    (row.activate, settled) = (true, false);
                 }
             }
         }
@@ -810,7 +816,7 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
             };
             if !rows.iter().chain(&fresh).any(known) {
                 let mut row = pair.row(s, before, Distance { value: d.value, normal });
-                (row.normal, row.gap, row.wanted) =
+                (row.normal, row.gap, row.activate) =
                     (across(normal, row.smooth), d.value - r * (1.0 + 2.0 * params::KEEP), true);
                 fresh.push(row);
             }
@@ -843,22 +849,22 @@ pub(crate) fn contacts<'a>(
 ) -> impl Iterator<Item = Contact> + use<'a> {
     rows.iter_mut().filter_map(|row| {
         // How far it slid, and slip that is still to be undone.
-        let (slid, drift) = if row.firm {
-            let trial = press(model, state, motion, row, false);
+        let (slid, residual_slip) = if row.firm {
+            let trial = evaluate_penalty(model, state, motion, row, false);
             if row.mode != Mode::Sticks {
-                decide(row, trial);
+                update_mode(row, trial);
             }
             forces(row, trial);
             let beyond = trial.length() - row.friction.length();
             (if beyond > 0.0 { beyond / row.stiffness } else { 0.0 }, DVec3::ZERO)
         } else {
-            look(model, state, motion, row);
-            let left = slip(state, motion, row) + (row.friction - row.anchor) * row.entered;
+            evaluate(model, state, motion, row);
+            let left = slip(state, motion, row) + (row.friction - row.friction_before) * row.effective_compliance;
             let at_limit = row.friction.length() >= params::AT_LIMIT * row.mu() * row.normal_force;
             if at_limit {
                 (left.length(), DVec3::ZERO)
             } else {
-                (0.0, left.clamp_length_max(params::DRIFT_MOST * row.radius))
+                (0.0, left.clamp_length_max(params::RESIDUAL_SLIP_MOST * row.radius))
             }
         };
         (row.normal_force > 0.0).then_some(Contact {
@@ -867,7 +873,7 @@ pub(crate) fn contacts<'a>(
             normal: row.normal,
             normal_force: row.normal_force,
             friction: row.friction,
-            drift,
+            residual_slip,
             sliding: slid > params::SLIP * row.radius,
         })
     })

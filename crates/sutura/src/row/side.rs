@@ -1,6 +1,6 @@
 //! One side of a contact constraint: which unknowns move it, and how.
 
-use crate::rod::freedom::Freedom;
+use crate::rod::constraint::NodeConstraint;
 use crate::row::border::Border;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -45,9 +45,9 @@ impl Endpoint {
     }
 
     /// What of it can give way: where a grip holds, the rods' matrix has a stiffness that stands for nothing.
-    pub fn restricted(&self, freedom: &[Freedom]) -> Self {
+    pub fn restricted(&self, constraint: &[NodeConstraint]) -> Self {
         let keep = |node: usize, columns: DMat3| {
-            if freedom[node] == Freedom::Free { columns } else { freedom[node].projector() * columns }
+            if constraint[node] == NodeConstraint::Free { columns } else { constraint[node].projector() * columns }
         };
         let x = 2 * self.element;
         Endpoint { here: keep(x, self.here), next: keep(x + 2, self.next), ..*self }

@@ -1,5 +1,5 @@
 //! Contact of thread with thread: the rows, their memory, and where new ones are needed. Their forces come from the
-//! small contact problem ([`couple`]).
+//! small contact problem ([`system`]).
 //!
 //! A row is a plane: two material places and a normal, fixed over the substep; where Newton's answer still brings two
 //! pieces too near, another row is added at their present closest places.
@@ -10,18 +10,18 @@
 //! converge.) Nor has it an arm about the other two: a thread drawn over a post of radius R would slide at its surface
 //! by R / (R + r) of its way only, and over an edge not at all.
 //!
-//! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the
+//! Friction sticks to an friction_before: the tangential spring's force and what the last solve left undone are depth_before to the
 //! next substep.
 //!
-//! [`couple`]: crate::row::couple
+//! [`system`]: crate::row::system
 
 use crate::collide::{Candidates, relative_motion};
 use crate::model::Model;
 use crate::motion::Motion;
 use crate::params;
 use crate::row::Rows;
-use crate::row::couple::{Entry, Source, regain};
 use crate::row::side::{Endpoint, Side};
+use crate::row::system::{Entry, Source, regain};
 use crate::segment;
 use crate::state::{Contact, Site, State};
 use glam::DVec3;
@@ -43,22 +43,22 @@ pub(crate) struct ThreadRow {
     least: f64,
     /// How many rows bear on the same patch, itself among them, were their forces equal.
     parts: f64,
-    /// Compliance with which it last entered the small problem \[m/N\].
-    entered: f64,
+    /// Compliance with which it last effective_compliance the small problem \[m/N\].
+    effective_compliance: f64,
     mu: [f64; 2],
     sliding: bool,
     /// Friction force on a at the start of the substep, and slip that was still to be undone.
-    anchor: DVec3,
-    drift: DVec3,
+    friction_before: DVec3,
+    residual_slip: DVec3,
     /// Force on a along the axes \[N\].
     pub force: DVec3,
     /// Left out of the small problem, it was violated.
-    wanted: bool,
+    activate: bool,
     /// Clearance already missing at the start: what its force does not explain is won back over a few substeps, not at
     /// once.
     start_gap: f64,
     /// Depth to which its force at the start presses \[m\].
-    carried: f64,
+    depth_before: f64,
 }
 
 impl ThreadRow {
@@ -85,15 +85,15 @@ impl ThreadRow {
             hertz,
             least: hertz * light * light.sqrt(),
             parts: 1.0,
-            entered: 0.0,
+            effective_compliance: 0.0,
             mu: [f.stick, f.slide],
             sliding: false,
-            anchor: DVec3::ZERO,
-            drift: DVec3::ZERO,
+            friction_before: DVec3::ZERO,
+            residual_slip: DVec3::ZERO,
             force: DVec3::ZERO,
-            wanted: false,
+            activate: false,
             start_gap: 0.0,
-            carried: 0.0,
+            depth_before: 0.0,
         }
     }
 
@@ -141,7 +141,7 @@ impl ThreadRow {
 
 /// Collects the rows of the substep at its start, with room for the predicted motion, and gives them the last substep's
 /// forces.
-pub(crate) fn begin(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) {
+pub(crate) fn prepare(model: &Model, state: &State, motion: &Motion, candidates: &Candidates, rows: &mut Rows) {
     let start = &motion.start;
     rows.threads.clear();
     let old = state.contacts.threads();
@@ -234,7 +234,7 @@ fn share(rows: &mut [ThreadRow], start: &[DVec3]) {
     for row in rows.iter_mut().filter(|r| r.parts > 1.0) {
         row.hertz /= row.parts;
         row.least /= row.parts;
-        row.carried = row.depth();
+        row.depth_before = row.depth();
     }
 }
 
@@ -292,7 +292,7 @@ fn merge(rows: &mut Vec<ThreadRow>) {
     });
 }
 
-/// Gives each old contact's force and anchor to the row that is nearest to it along both threads, within an element and
+/// Gives each old contact's force and friction_before to the row that is nearest to it along both threads, within an element and
 /// a half.
 fn inherit(old: &[Contact], rows: &mut [ThreadRow]) {
     for c in old {
@@ -312,29 +312,35 @@ fn inherit(old: &[Contact], rows: &mut [ThreadRow]) {
             let n = row.axes[0];
             let friction = c.friction - n * n.dot(c.friction);
             row.force += DVec3::new(c.normal_force, row.axes[1].dot(friction), row.axes[2].dot(friction));
-            row.anchor += friction;
-            row.drift = c.drift - n * n.dot(c.drift);
+            row.friction_before += friction;
+            row.residual_slip = c.residual_slip - n * n.dot(c.residual_slip);
             row.sliding |= c.sliding;
-            row.carried = row.depth();
+            row.depth_before = row.depth();
         }
     }
 }
 
 /// Adds the rows that may act to the small problem.
-pub(crate) fn enter(state: &State, motion: &Motion, step: &[DVec3], rows: &mut [ThreadRow], entries: &mut Vec<Entry>) {
+pub(crate) fn add_entries(
+    state: &State,
+    motion: &Motion,
+    step: &[DVec3],
+    rows: &mut [ThreadRow],
+    entries: &mut Vec<Entry>,
+) {
     for (k, row) in rows.iter_mut().enumerate() {
         // Where the step without contact forces would leave the row.
         let d = |e: usize, s: f64| step[2 * e] * (1.0 - s) + step[2 * e + 2] * s;
         let moved = d(row.a, row.s) - d(row.b, row.t);
         let n = row.axes[0];
         let gap = n.dot(row.apart(&state.position)) - row.sum + n.dot(moved);
-        if row.force.x <= 0.0 && !row.wanted && gap > params::PRUNE * row.radii[0].min(row.radii[1]) {
+        if row.force.x <= 0.0 && !row.activate && gap > params::PRUNE * row.radii[0].min(row.radii[1]) {
             row.force = DVec3::ZERO;
             continue;
         }
-        row.entered = row.compliance();
-        let slip = row.slip(state, motion) + moved + row.drift - row.anchor * row.entered;
-        let (allowed, normal) = regain(row.start_gap, row.carried, row.entered);
+        row.effective_compliance = row.compliance();
+        let slip = row.slip(state, motion) + moved + row.residual_slip - row.friction_before * row.effective_compliance;
+        let (allowed, normal) = regain(row.start_gap, row.depth_before, row.effective_compliance);
         let [a, b] = row.endpoints();
         entries.push(Entry {
             source: Source::Thread(k as u32),
@@ -342,7 +348,7 @@ pub(crate) fn enter(state: &State, motion: &Motion, step: &[DVec3], rows: &mut [
             sides: [Side::Chain(a), Side::Chain(b)],
             free: DVec3::new(gap - allowed, slip.dot(row.axes[1]), slip.dot(row.axes[2])),
             mu: row.mu[usize::from(row.sliding)],
-            compliance: DVec3::new(normal, row.entered, row.entered),
+            compliance: DVec3::new(normal, row.effective_compliance, row.effective_compliance),
             radius: row.radii[0].min(row.radii[1]),
             force: row.force,
         });
@@ -449,7 +455,7 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
                 && r.axes[0].dot(row.axes[0]) > 0.9999
         });
         match same {
-            Some(old) => found |= !core::mem::replace(&mut old.wanted, true),
+            Some(old) => found |= !core::mem::replace(&mut old.activate, true),
             None => {
                 rows.threads.push(*row);
                 found = true;
@@ -469,17 +475,18 @@ pub(crate) fn contacts<'a>(
     rows.iter().filter(|r| r.force.x > 0.0).map(|row| {
         let friction = row.axes[1] * row.force.y + row.axes[2] * row.force.z;
         let limit = row.mu[usize::from(row.sliding)] * row.force.x;
-        let left = row.drift + row.slip(state, motion) + (friction - row.anchor) * row.entered;
+        let left =
+            row.residual_slip + row.slip(state, motion) + (friction - row.friction_before) * row.effective_compliance;
         let at_limit = friction.length() >= params::AT_LIMIT * limit;
         let sliding = at_limit && left.length() > params::SLIP * row.radii[0].min(row.radii[1]);
-        let most = params::DRIFT_MOST * row.radii[0];
+        let most = params::RESIDUAL_SLIP_MOST * row.radii[0];
         Contact {
             a: Site::Thread { element: row.a as u32, s: row.s },
             b: Site::Thread { element: row.b as u32, s: row.t },
             normal: row.axes[0],
             normal_force: row.force.x,
             friction,
-            drift: if at_limit { DVec3::ZERO } else { left.clamp_length_max(most) },
+            residual_slip: if at_limit { DVec3::ZERO } else { left.clamp_length_max(most) },
             sliding,
         }
     })

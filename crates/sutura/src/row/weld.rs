@@ -9,7 +9,7 @@
 use crate::math::{exp, skew};
 use crate::model::Model;
 use crate::rod::assemble::clamp_terms;
-use crate::rod::freedom::{ClampJoint, Freedom};
+use crate::rod::constraint::{ClampJoint, NodeConstraint};
 use crate::rod::half_angle;
 use crate::rod::scratch::RodScratch;
 use crate::row::Rows;
@@ -28,8 +28,8 @@ pub(crate) struct Welds {
 struct Active {
     slot: u32,
     /// What may move of its place, and of its turning.
-    place: Freedom,
-    turning: Freedom,
+    place: NodeConstraint,
+    turning: NodeConstraint,
 }
 
 /// Half a joint between a weld and a frame, as last assembled.
@@ -58,7 +58,7 @@ impl Welds {
         self.joints.clear();
         for (slot, weld) in model.welds.iter() {
             let k = self.welds.len();
-            self.welds.push(Active { slot, place: Freedom::Free, turning: Freedom::Free });
+            self.welds.push(Active { slot, place: NodeConstraint::Free, turning: NodeConstraint::Free });
             let orientation = state.weld_orientation[slot as usize];
             for member in &weld.members {
                 if member.before.is_some() && member.after.is_some() {
@@ -90,23 +90,23 @@ impl Welds {
     /// Keeps the cross-section of a weld from turning.
     pub fn hold_turning(&mut self, slot: u32) {
         for w in self.welds.iter_mut().filter(|w| w.slot == slot) {
-            w.turning = Freedom::Held;
+            w.turning = NodeConstraint::Held;
         }
     }
 
     /// Moves the welds to the iterate that Newton starts from. A weld is held where one of its particles is.
-    pub fn predict(&mut self, model: &Model, state: &mut State, freedom: &mut [Freedom], h: f64) {
+    pub fn predict(&mut self, model: &Model, state: &mut State, constraint: &mut [NodeConstraint], h: f64) {
         for (k, w) in self.welds.iter_mut().enumerate() {
             let members = &model.welds.at(w.slot).expect("living").members;
-            let held = members.iter().map(|m| m.index(model)).find(|i| freedom[2 * i] != Freedom::Free);
+            let held = members.iter().map(|m| m.index(model)).find(|i| constraint[2 * i] != NodeConstraint::Free);
             let from = held.unwrap_or_else(|| members[0].index(model));
-            w.place = freedom[2 * from];
+            w.place = constraint[2 * from];
             let place = state.position[from];
             for i in members.iter().map(|m| m.index(model)) {
                 state.position[i] = place;
-                freedom[2 * i] = Freedom::Held;
+                constraint[2 * i] = NodeConstraint::Held;
             }
-            if w.turning == Freedom::Free
+            if w.turning == NodeConstraint::Free
                 && let Some(joint) = self.joints.iter().find(|j| j.weld == k)
             {
                 let q = &mut state.weld_orientation[w.slot as usize];

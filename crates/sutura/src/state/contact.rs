@@ -23,7 +23,7 @@ pub(crate) struct Contact {
     pub normal_force: f64,
     pub friction: DVec3,
     /// Slip that the friction spring has still to undo \[m\].
-    pub drift: DVec3,
+    pub residual_slip: DVec3,
     pub sliding: bool,
 }
 

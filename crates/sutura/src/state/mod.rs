@@ -13,14 +13,14 @@ use glam::{DQuat, DVec3};
 
 /// What the next substep can count on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) enum Onset {
+pub(crate) enum History {
     /// Nothing but positions and velocities: something was edited, or nothing was stepped yet.
     #[default]
     Unknown,
     /// Contacts have just changed: accelerations are about to jump.
-    Broken,
+    Discontinuous,
     /// The accelerations in the state are those of its forces.
-    Smooth,
+    Valid,
 }
 
 /// One vector a quantity.
@@ -31,7 +31,7 @@ pub struct State {
     /// Length of the last substep that was accepted as a part of a halved one \[s\]; 0 after a whole one.
     pub(crate) last_h: f64,
     /// Accepted substeps since their length last changed.
-    pub(crate) calm: u32,
+    pub(crate) accepted_in_row: u32,
 
     /// Rest length of each element \[m\]; the model has the same.
     pub(crate) rest_length: Vec<f64>,
@@ -39,11 +39,11 @@ pub struct State {
     pub(crate) velocity: Vec<DVec3>,
     pub(crate) orientation: Vec<DQuat>,
     pub(crate) angular_velocity: Vec<DVec3>,
-    /// Rates of the two, without damping, where the integrator needs them and `onset` says that they are known; else
+    /// Rates of the two, without damping, where the integrator needs them and `history` says that they are known; else
     /// empty.
     pub(crate) acceleration: Vec<DVec3>,
     pub(crate) angular_acceleration: Vec<DVec3>,
-    pub(crate) onset: Onset,
+    pub(crate) history: History,
     /// Tension of each element at the last accepted state \[N\]: geometric stiffness, and the first guess of
     /// inextensible elements.
     pub(crate) tension: Vec<f64>,
@@ -133,8 +133,8 @@ pub(crate) struct ReelState {
 
 impl State {
     /// Forgets the accelerations, for `why`.
-    pub(crate) fn interrupt(&mut self, why: Onset) {
-        self.onset = why;
+    pub(crate) fn invalidate(&mut self, why: History) {
+        self.history = why;
         self.acceleration.clear();
         self.angular_acceleration.clear();
     }
@@ -143,7 +143,7 @@ impl State {
         let State {
             time,
             last_h,
-            calm,
+            accepted_in_row,
             rest_length,
             position,
             velocity,
@@ -151,7 +151,7 @@ impl State {
             angular_velocity,
             acceleration,
             angular_acceleration,
-            onset,
+            history,
             tension,
             plastic,
             hardened,
@@ -165,7 +165,7 @@ impl State {
         } = from;
         self.time = *time;
         self.last_h = *last_h;
-        self.calm = *calm;
+        self.accepted_in_row = *accepted_in_row;
         self.rest_length.clone_from(rest_length);
         self.position.clone_from(position);
         self.velocity.clone_from(velocity);
@@ -173,7 +173,7 @@ impl State {
         self.angular_velocity.clone_from(angular_velocity);
         self.acceleration.clone_from(acceleration);
         self.angular_acceleration.clone_from(angular_acceleration);
-        self.onset = *onset;
+        self.history = *history;
         self.tension.clone_from(tension);
         self.plastic.clone_from(plastic);
         self.hardened.clone_from(hardened);

@@ -7,7 +7,7 @@ use crate::math::Pose;
 use crate::model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{RodModel, Stretch};
-use crate::state::{GripState, LoadState, Onset, ReelState};
+use crate::state::{GripState, History, LoadState, ReelState};
 use glam::{DQuat, DVec3};
 
 impl World {
@@ -64,7 +64,7 @@ impl World {
             }
         };
         let pose = Pose::new(position, orientation);
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         Ok(self.state.grips.insert(GripState {
             rod: spec.rod.index,
             index,
@@ -87,7 +87,7 @@ impl World {
     /// Lets go.
     pub fn remove_grip(&mut self, grip: Handle<Grip>) -> Result<(), Error> {
         self.state.grips.remove(grip).ok_or(GRIP)?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         Ok(())
     }
 
@@ -111,7 +111,7 @@ impl World {
         let g = self.state.grips.get_mut(grip).ok_or(GRIP)?;
         g.drive = drive;
         g.target = g.pose;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         Ok(())
     }
 
@@ -144,7 +144,7 @@ impl World {
         let rod = self.model.rods.get(spec.rod).ok_or(ROD)?;
         self.validate_load(&spec.kind, rod)?;
         let handle = self.state.loads.insert(LoadState { rod: spec.rod.index, kind: spec.kind });
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(handle)
     }
@@ -156,7 +156,7 @@ impl World {
         if let Some(l) = self.state.loads.get_mut(load) {
             l.kind = kind;
         }
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
@@ -164,7 +164,7 @@ impl World {
     /// Removes a load.
     pub fn remove_load(&mut self, load: Handle<Load>) -> Result<(), Error> {
         self.state.loads.remove(load).ok_or(LOAD)?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.model.refresh_masses(&self.state.loads);
         Ok(())
     }
@@ -195,7 +195,7 @@ impl World {
             return Err(Error::invalid("reel", "at_end", spec.at_end, "an end whose last element no jaw holds"));
         }
         let nominal = model.rest_length[e];
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         let reel = ReelState {
             rod: spec.rod.index,
             at_end: spec.at_end,

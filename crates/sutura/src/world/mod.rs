@@ -17,7 +17,7 @@ use crate::model::{Model, Placed};
 use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
-use crate::state::{Onset, State};
+use crate::state::{History, State};
 use crate::step::Step;
 use crate::view::{ContactView, View};
 use glam::DVec3;
@@ -86,7 +86,7 @@ impl World {
             ));
         }
         self.model.settings = settings;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         if before != Solver::Direct && after == Solver::Direct {
             self.follow_strain(0..self.model.mass.len());
         }
@@ -129,7 +129,7 @@ impl World {
             Ok(i) => self.model.friction[i].1 = friction,
             Err(i) => self.model.friction.insert(i, (key, friction)),
         }
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         Ok(())
     }
 

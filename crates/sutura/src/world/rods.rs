@@ -9,7 +9,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::{Rod, RodModel, RodSpec, Stretch};
 use crate::model::weld::{Member, Side, WeldModel};
 use crate::row;
-use crate::state::{Onset, ReelState, Site};
+use crate::state::{History, ReelState, Site};
 use crate::view::RodView;
 use glam::{DQuat, DVec3};
 
@@ -17,7 +17,7 @@ impl World {
     /// Adds a thread.
     pub fn insert_rod(&mut self, spec: &RodSpec) -> Result<Handle<Rod>, Error> {
         let low = spec.lower()?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         let n = low.rest_lengths.len();
         let (model, state) = (&mut self.model, &mut self.state);
         let first = model.mass.len();
@@ -146,7 +146,7 @@ impl World {
                 "numbers with which the energy of the world is finite",
             ));
         }
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         Ok(())
     }
 
@@ -154,7 +154,7 @@ impl World {
     /// left.
     pub fn remove_rod(&mut self, rod: Handle<Rod>) -> Result<(), Error> {
         let gone = self.model.rods.remove(rod).ok_or(ROD)?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         let range = gone.particles();
         let (model, state) = (&mut self.model, &mut self.state);
         model.remove_entries(range.clone());

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::grip::{Hold, LoadKind, Place};
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{Onset, Site, State};
+use crate::state::{History, Site, State};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -36,7 +36,7 @@ impl World {
         if fits.is_ok() {
             self.take_up(&state);
             if materials.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
-                self.state.interrupt(Onset::Unknown);
+                self.state.invalidate(History::Unknown);
                 self.follow_strain(0..self.model.mass.len());
             }
         }
@@ -69,7 +69,7 @@ impl World {
         if s.weld_orientation.len() != self.model.welds.len() {
             return Err("it is of a world with other welds");
         }
-        let known = if s.onset == Onset::Smooth { n } else { 0 };
+        let known = if s.history == History::Valid { n } else { 0 };
         if s.acceleration.len() != known || s.angular_acceleration.len() != known {
             return Err("it has accelerations where there are none, or none where there are");
         }
@@ -125,7 +125,7 @@ impl World {
                 && c.elements().is_none_or(|(a, b)| a < b)
                 && (c.normal.length() - 1.0).abs() < 1e-6
                 && c.force().is_finite()
-                && c.drift.is_finite()
+                && c.residual_slip.is_finite()
         });
         if !contacts {
             return Err("a contact is out of range");

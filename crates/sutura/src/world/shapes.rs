@@ -6,7 +6,7 @@ use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::ShapeModel;
 use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
-use crate::state::Onset;
+use crate::state::History;
 use crate::view::ShapeView;
 
 impl World {
@@ -39,7 +39,7 @@ impl World {
     /// Removes a shape.
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
         self.model.shapes.remove(shape).ok_or(SHAPE)?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.state.contacts.retain(|c| c.b.shape() != Some(shape.index));
         Ok(())
     }
@@ -61,7 +61,7 @@ impl World {
     pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
         motion.validate()?;
         self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::model::grip::{Hold, Place};
 use crate::model::rod::Rod;
 use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
 use crate::row;
-use crate::state::Onset;
+use crate::state::History;
 use glam::{DQuat, DVec3};
 
 impl World {
@@ -128,7 +128,7 @@ impl World {
     /// What lay in each other at the weld touches from now on, and is pushed apart.
     pub fn remove_weld(&mut self, weld: Handle<Weld>) -> Result<(), Error> {
         let gone = self.model.welds.remove(weld).ok_or(WELD)?;
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         self.model.refresh_welds();
         self.hold_alone(&gone);
         Ok(())
@@ -156,10 +156,10 @@ impl World {
     }
 
     pub(super) fn join(&mut self, members: Vec<Member>, orientation: DQuat) -> Handle<Weld> {
-        self.state.interrupt(Onset::Unknown);
+        self.state.invalidate(History::Unknown);
         let radius = members.iter().map(|m| self.radius_of(m.index(&self.model))).fold(0.0, f64::max);
-        let mut weld = WeldModel { members, exempt: core::f64::consts::PI * radius };
-        weld.exempt = crate::collide::exempt(&self.model, &self.state.position, &weld);
+        let mut weld = WeldModel { members, filter_distance: core::f64::consts::PI * radius };
+        weld.filter_distance = crate::collide::filter_distance(&self.model, &self.state.position, &weld);
         let handle: Handle<Weld> = self.model.welds.insert(weld);
         self.state.weld_orientation.resize(self.model.welds.len(), DQuat::IDENTITY);
         self.state.weld_orientation[handle.index()] = orientation;

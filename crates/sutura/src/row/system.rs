@@ -2,19 +2,19 @@
 //!
 //! Each [`Entry`] is one contact. With W the inverse of the rods' Newton matrix and G the Jacobian of the contacts, `S
 //! = G W G^T` is the compliance between contacts. Newton's step without contact gives the right side, the contact
-//! forces follow from S ([`cone`]), and then the step that they cause. (A contact sweep that moves particles by their
+//! forces follow from S ([`active_set`]), and then the step that they cause. (A contact sweep that moves particles by their
 //! own inertia, m / h^2, cannot hold: the rod behind them is 10^5 times stiffer.)
 //!
-//! [`cone`]: crate::row::cone
+//! [`active_set`]: crate::row::active_set
 
 use crate::effort::Effort;
 use crate::motion::Motion;
 use crate::params;
+use crate::rod::constraint::NodeConstraint;
 use crate::rod::factor::{Block, Columns, System};
-use crate::rod::freedom::Freedom;
 use crate::rod::scratch::RodScratch;
+use crate::row::active_set::{ActiveSet, Limits};
 use crate::row::border::Border;
-use crate::row::cone::{Cone, Limits};
 use crate::row::dense::Dense;
 use crate::row::side::{Endpoint, Side};
 use crate::row::sparse::Sparse;
@@ -89,7 +89,7 @@ impl Assembly {
         &mut self,
         system: &mut System,
         rods: &[(Range<usize>, Range<usize>)],
-        freedom: &[Freedom],
+        constraint: &[NodeConstraint],
         entries: &[Entry],
         s: &mut [f64],
     ) {
@@ -98,7 +98,7 @@ impl Assembly {
             endpoints.clear();
             for (k, entry) in entries.iter().enumerate() {
                 let inside = entry.ends().filter(|p| p.within(zone));
-                endpoints.extend(inside.map(|at| Placed { entry: k as u32, at: at.restricted(freedom) }));
+                endpoints.extend(inside.map(|at| Placed { entry: k as u32, at: at.restricted(constraint) }));
             }
             if endpoints.is_empty() {
                 continue;
@@ -203,7 +203,7 @@ struct Island {
     entries: Range<usize>,
     dense: Dense,
     sparse: Sparse,
-    cone: Cone,
+    cone: ActiveSet,
     /// The sparse matrix is in use; what a solution may take; the least radius of the entries.
     many: bool,
     limits: Limits,
@@ -246,8 +246,8 @@ impl Island {
 /// Sorts the entries by islands and finds these: rods that touch each other are of one, and all are where they share
 /// something at the border. An island is numbered as the first of its rods, so that it finds its memory again in the
 /// next iteration.
-fn find_islands(coupling: &mut Coupling, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
-    let Coupling { entries, islands, active, root, .. } = coupling;
+fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
+    let ContactSystem { entries, islands, active, root, .. } = coupling;
     root.clear();
     root.extend((0..rods.len() as u32).map(|r| if shared { 0 } else { r }));
     // In the order of slots, which need not be that of the arrays.
@@ -283,7 +283,7 @@ fn find_islands(coupling: &mut Coupling, rods: &[(Range<usize>, Range<usize>)], 
 
 /// Memory of the coupling.
 #[derive(Default)]
-pub(crate) struct Coupling {
+pub(crate) struct ContactSystem {
     /// Island by island.
     entries: Vec<Entry>,
     islands: Vec<Island>,
@@ -301,7 +301,7 @@ pub(crate) struct Coupling {
     left: f64,
 }
 
-impl Coupling {
+impl ContactSystem {
     /// Residual of the last solution, in radii.
     pub fn left(&self) -> f64 {
         self.left
@@ -335,7 +335,7 @@ pub(crate) fn zones(ranges: &mut [(Range<usize>, Range<usize>)], rows: &Rows) {
             .threads
             .iter()
             .flat_map(thread::ThreadRow::elements)
-            .chain(rows.shapes.iter().filter_map(shape::ShapeRow::entering));
+            .chain(rows.shapes.iter().filter_map(shape::ShapeRow::compliant_element));
         for e in touched.filter(|e| blocks.contains(e)) {
             lo = lo.min(e);
             hi = hi.max(e + 1);
@@ -347,20 +347,20 @@ pub(crate) fn zones(ranges: &mut [(Range<usize>, Range<usize>)], rows: &Rows) {
 }
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `rods.step`.
-pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
+pub(crate) fn solve(state: &State, motion: &Motion, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
     let may_spend = effort.allowed - effort.spent;
-    let RodScratch { ranges: rods, system, step, freedom, .. } = rods;
+    let RodScratch { ranges: rods, system, step, constraint, .. } = rods;
     let work = &mut effort.now;
     let entries = &mut rows.solver.entries;
     entries.clear();
-    thread::enter(state, motion, step, &mut rows.threads, entries);
-    shape::enter(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
+    thread::add_entries(state, motion, step, &mut rows.threads, entries);
+    shape::add_entries(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
     }
     find_islands(&mut rows.solver, rods, rows.border.count() > 0);
-    let Coupling { entries, islands, active, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
+    let ContactSystem { entries, islands, active, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -392,7 +392,7 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
             zones().for_each(|zone| system.invert_zone(zone));
             island.sparse.begin(system, zones());
             for entry in entries {
-                let ends = entry.ends().map(|p| p.restricted(freedom));
+                let ends = entry.ends().map(|p| p.restricted(constraint));
                 let diagonal = ends.clone().map(|p| own_compliance(system, &p)).sum::<DVec3>() + entry.compliance;
                 let places = ends.flat_map(|p| [(p.element, p.here), (p.element + 1, p.next)]);
                 island.sparse.push(places, entry.compliance, diagonal);
@@ -400,7 +400,7 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
             positive = island.sparse.prepare();
         } else {
             island.dense.begin(n);
-            assembly.compliance(system, rods, freedom, entries, &mut island.dense.s);
+            assembly.compliance(system, rods, constraint, entries, &mut island.dense.s);
             assembly.shared(&mut rows.border, entries, &mut island.dense.s);
             finish_dense(entries, &mut island.dense.s);
         }
@@ -421,7 +421,7 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
     right.resize(step.len(), DVec3::ZERO);
     load(entries, force, &mut rows.border, right);
     hand_over(entries, force, &mut rows.threads, &mut rows.shapes);
-    respond(rods, system, freedom, &mut rows.border, right);
+    respond(rods, system, constraint, &mut rows.border, right);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
     }
@@ -431,14 +431,14 @@ pub(crate) fn couple(state: &State, motion: &Motion, rods: &mut RodScratch, rows
 fn respond(
     rods: &[(Range<usize>, Range<usize>)],
     system: &System,
-    freedom: &[Freedom],
+    constraint: &[NodeConstraint],
     border: &mut Border,
     right: &mut [DVec3],
 ) {
     border.load_carried(right);
-    for (r, freedom) in right.iter_mut().zip(freedom.iter()) {
-        if *freedom != Freedom::Free {
-            *r = freedom.projector() * *r;
+    for (r, constraint) in right.iter_mut().zip(constraint.iter()) {
+        if *constraint != NodeConstraint::Free {
+            *r = constraint.projector() * *r;
         }
     }
     for (rod, zone) in rods {
@@ -467,10 +467,10 @@ fn load(entries: &[Entry], force: &[f64], border: &mut Border, right: &mut [DVec
 /// Replaces forces on the nodes by the step that they cause while the contacts that press go on pressing: the linear
 /// response of the last solution. The border's steps are to be set aside.
 pub(crate) fn pressed_response(rods: &RodScratch, rows: &mut Rows, effort: &mut Effort, right: &mut [DVec3]) {
-    let RodScratch { ranges: rods, system, freedom, .. } = rods;
+    let RodScratch { ranges: rods, system, constraint, .. } = rods;
     let work = &mut effort.now;
-    let Coupling { entries, islands, active, right: more, change, b, .. } = &mut rows.solver;
-    respond(rods, system, freedom, &mut rows.border, right);
+    let ContactSystem { entries, islands, active, right: more, change, b, .. } = &mut rows.solver;
+    respond(rods, system, constraint, &mut rows.border, right);
     *work += 100.0 * right.len() as f64;
     if entries.is_empty() {
         return;
@@ -482,7 +482,7 @@ pub(crate) fn pressed_response(rods: &RodScratch, rows: &mut Rows, effort: &mut 
     more.clear();
     more.resize(right.len(), DVec3::ZERO);
     load(entries, change, &mut rows.border, more);
-    respond(rods, system, freedom, &mut rows.border, more);
+    respond(rods, system, constraint, &mut rows.border, more);
     for (z, r) in right.iter_mut().zip(more.iter()) {
         *z += *r;
     }
@@ -491,12 +491,13 @@ pub(crate) fn pressed_response(rods: &RodScratch, rows: &mut Rows, effort: &mut 
 /// Adds more forces on the nodes to the iteration: finds the contact forces again, with the same matrix, and adds the
 /// step of both.
 pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort, right: &mut [DVec3]) {
-    let RodScratch { ranges: rods, system, step, freedom, .. } = rods;
+    let RodScratch { ranges: rods, system, step, constraint, .. } = rods;
     let work = &mut effort.now;
-    let Coupling { entries, islands, active, right: more, change, steps, b, mu, force, left, .. } = &mut rows.solver;
+    let ContactSystem { entries, islands, active, right: more, change, steps, b, mu, force, left, .. } =
+        &mut rows.solver;
     steps.clear();
     rows.border.swap_steps(steps);
-    respond(rods, system, freedom, &mut rows.border, right);
+    respond(rods, system, constraint, &mut rows.border, right);
     if !entries.is_empty() {
         shift(entries, &rows.border, right, b);
         change.clone_from(force);
@@ -512,7 +513,7 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
         more.clear();
         more.resize(right.len(), DVec3::ZERO);
         load(entries, change, &mut rows.border, more);
-        respond(rods, system, freedom, &mut rows.border, more);
+        respond(rods, system, constraint, &mut rows.border, more);
         for (z, r) in right.iter_mut().zip(more.iter()) {
             *z += *r;
         }

@@ -48,7 +48,7 @@ const FIRST: f64 = 100.0;
 
 /// Memory of the solver.
 #[derive(Default)]
-pub(crate) struct Cone {
+pub(crate) struct ActiveSet {
     set: WorkingSet,
     disc: Vec<f64>,
     gradient: Vec<f64>,
@@ -60,7 +60,7 @@ pub(crate) struct Cone {
     left: f64,
 }
 
-impl Cone {
+impl ActiveSet {
     /// Solves for `l` (three components a contact: normal, two tangential), starting from its value. `mu` is the
     /// coefficient of each contact. Returns the residual reached \[m\].
     pub fn solve(&mut self, s: &mut impl Delassus, b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {
@@ -399,7 +399,7 @@ mod tests {
     #[test]
     fn satisfies_coulomb_on_redundant_contacts() {
         let mut seed = 3;
-        let mut cone = Cone::default();
+        let mut cone = ActiveSet::default();
         for (m, rank) in [(1, 3), (4, 6), (10, 20), (25, 30), (40, 60)] {
             for mu in [0.0, 0.1, 0.4] {
                 let (s, b) = problem(m, rank, &mut seed);

@@ -5,12 +5,12 @@ use glam::{DMat3, DQuat, DVec3};
 
 /// What may move at a node of the linear system.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Freedom {
+pub(crate) enum NodeConstraint {
     Free,
     Held,
     /// Only along a unit direction, with a force there \[N\] and a damper against it (force per move within the
     /// substep, \[N/m\]). Its move is counted from `from`.
-    Line {
+    Guided {
         direction: DVec3,
         force: f64,
         damper: f64,
@@ -18,23 +18,23 @@ pub(crate) enum Freedom {
     },
     /// Everywhere, with a force \[N\] and a damper that acts in every direction (force per move within the substep,
     /// \[N/m\]). Its move is counted from `from`.
-    Led {
+    Damped {
         force: DVec3,
         damper: f64,
         from: DVec3,
     },
 }
 
-impl Freedom {
+impl NodeConstraint {
     /// Stiffness and force of what drives the node at `position`, if something does.
     pub fn drive(&self, position: DVec3) -> Option<(DMat3, DVec3)> {
         match *self {
-            Freedom::Free | Freedom::Held => None,
-            Freedom::Line { direction, force, damper, from } => Some((
+            NodeConstraint::Free | NodeConstraint::Held => None,
+            NodeConstraint::Guided { direction, force, damper, from } => Some((
                 outer(direction, direction) * damper,
                 direction * (force - damper * direction.dot(position - from)),
             )),
-            Freedom::Led { force, damper, from } => {
+            NodeConstraint::Damped { force, damper, from } => {
                 Some((DMat3::IDENTITY * damper, force - (position - from) * damper))
             }
         }
@@ -42,9 +42,9 @@ impl Freedom {
     /// Projector on the directions that stay free.
     pub fn projector(&self) -> DMat3 {
         match self {
-            Freedom::Free | Freedom::Led { .. } => DMat3::IDENTITY,
-            Freedom::Held => DMat3::ZERO,
-            Freedom::Line { direction, .. } => outer(*direction, *direction),
+            NodeConstraint::Free | NodeConstraint::Damped { .. } => DMat3::IDENTITY,
+            NodeConstraint::Held => DMat3::ZERO,
+            NodeConstraint::Guided { direction, .. } => outer(*direction, *direction),
         }
     }
 }

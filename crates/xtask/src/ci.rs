@@ -1,6 +1,7 @@
 //! What the whole check consists of. A step that fails does not stop the others.
 
 use crate::fuzz;
+use crate::imports;
 use crate::program::{self, GlbValidator, Profile};
 use crate::tally::{Tally, cargo, root};
 use crate::viewer;
@@ -26,6 +27,7 @@ const RUN_AGAIN: &[&str] = &["hanging_helix", "capstan"];
 pub fn everything(tally: &mut Tally) {
     tally.run("format", &mut cargo(&["fmt", "--check", "--all"]));
     tally.run("lints", &mut cargo(&["clippy", "--workspace", "--all-targets", "--", "--deny", "warnings"]));
+    imports::check(tally);
     tests(tally, &[]);
     // The programs have nothing to document beyond their own help. Steps select the whole workspace where they can: a
     // part of it would choose other features of the dependencies and build them again.

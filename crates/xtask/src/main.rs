@@ -3,6 +3,7 @@
 
 mod ci;
 mod fuzz;
+mod imports;
 mod program;
 mod release;
 mod tally;
@@ -18,6 +19,7 @@ cargo xtask scenes [NAMES]   run sample scenes with the release build and valida
 cargo xtask bench [ARGS]     `sutura bench` with the release build
 cargo xtask fuzz [TARGET] [--minutes M]
                              fuzz one target or all, each for so long (10)
+cargo xtask imports [--list] do modules of the engine import each other in a circle? --list prints every import
 cargo xtask viewer           the part of the whole check that is about the plugin for Bevy and the viewer
 cargo xtask bless            run the square knot and take its last picture for the README
 cargo xtask release          is this commit ready to be released? (changes nothing)";
@@ -28,7 +30,7 @@ fn main() -> ExitCode {
         println!("{HELP}");
         return ExitCode::SUCCESS;
     };
-    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench" | "fuzz");
+    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench" | "fuzz" | "imports");
     let mut tally = Tally::default();
     match command.as_str() {
         _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
@@ -41,6 +43,11 @@ fn main() -> ExitCode {
         "bench" => program::bench(&mut tally, rest),
         "fuzz" => {
             if let Err(problem) = fuzz::command(&mut tally, rest) {
+                return usage(&problem);
+            }
+        }
+        "imports" => {
+            if let Err(problem) = imports::command(&mut tally, rest) {
                 return usage(&problem);
             }
         }

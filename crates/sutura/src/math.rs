@@ -233,6 +233,12 @@ pub(crate) fn max_or_nan(a: f64, b: f64) -> f64 {
     if b <= a || a.is_nan() { a } else { b }
 }
 
+/// Whether two lengths are the same but for rounding of how they were worked out.
+pub(crate) fn same(a: f64, b: f64) -> bool {
+    const ROUNDING: f64 = 1e-9;
+    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -230,7 +230,7 @@ pub(crate) fn check_lengths(model: &Model, from: &State, to: &State) -> Result<(
         };
         let reels = [false, true].map(|at_end| (nominal(from, at_end), nominal(to, at_end)));
         if reels.iter().all(|(a, b)| a.is_none() && b.is_none()) {
-            if let Some(e) = (0..n).find(|e| !crate::snapshot::same(here[*e], there[*e])) {
+            if let Some(e) = (0..n).find(|e| !crate::math::same(here[*e], there[*e])) {
                 return differs(format!("element {e}"), here[e], there[e]);
             }
             continue;
@@ -239,7 +239,7 @@ pub(crate) fn check_lengths(model: &Model, from: &State, to: &State) -> Result<(
             let at = |lengths: &[f64]| lengths[if at_end == 1 { lengths.len() - 1 } else { 0 }];
             if now.is_some() || then.is_some() {
                 let (here, there) = (now.unwrap_or(at(here)), then.unwrap_or(at(there)));
-                if !crate::snapshot::same(here, there) {
+                if !crate::math::same(here, there) {
                     return differs(
                         format!("an element at the {}", if at_end == 1 { "end" } else { "start" }),
                         here,

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::handle::Slots;
-use crate::math::Pose;
+use crate::math::{self, Pose};
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
 use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
@@ -345,7 +345,7 @@ impl Build {
                 format!("it has {} elements there, {} here", there.n_elements, here.n_elements)
             } else if here.closed != there.closed {
                 format!("it is {} there, {} here", words(there.closed), words(here.closed))
-            } else if !same(here.radius, there.radius) {
+            } else if !math::same(here.radius, there.radius) {
                 format!("its radius is {} m there, {} m here", there.radius, here.radius)
             } else if here.section != there.section {
                 "its cross-section is another there".into()
@@ -407,12 +407,6 @@ impl BuiltRod {
             rest: fnv(&rest),
         }
     }
-}
-
-/// Whether two lengths are the same but for rounding of how they were worked out.
-pub(crate) fn same(a: f64, b: f64) -> bool {
-    const ROUNDING: f64 = 1e-9;
-    (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
 }
 
 pub(crate) fn hash_of(value: &impl Bytes) -> u64 {

@@ -11,7 +11,7 @@ use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
 use crate::motion::Motion;
 use crate::params;
-use crate::report::Rejection;
+use crate::rejection::Rejection;
 use crate::segment;
 use crate::state::State;
 use core::ops::Range;

@@ -26,7 +26,11 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
             Some(c.force().abs() + arm.cross(c.force()).abs())
         })
         .sum();
-    grips && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
+    let bodies = state.bodies.iter().all(|(_, b)| {
+        [b.position, b.velocity, b.angular_momentum, b.acceleration, b.torque].iter().all(|v| v.is_finite())
+    });
+    let between = state.contacts.bodies().iter().all(|c| c.force().is_finite());
+    grips && bodies && between && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
 }
 
 /// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending

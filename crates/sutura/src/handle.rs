@@ -83,6 +83,17 @@ impl<T> Slots<T> {
     {
         self.slots.clone_from(&from.slots);
     }
+    /// Fills a slot, and makes room for it.
+    pub(crate) fn put(&mut self, index: u32, value: T) {
+        while self.slots.len() <= index as usize {
+            self.slots.push((0, None));
+        }
+        self.slots[index as usize].1 = Some(value);
+    }
+    /// Empties a slot.
+    pub(crate) fn empty(&mut self, index: u32) {
+        self.slots[index as usize].1 = None;
+    }
     pub(crate) fn retain(&mut self, keep: impl Fn(&T) -> bool) {
         for (_, slot) in &mut self.slots {
             if slot.as_ref().is_some_and(|v| !keep(v)) {

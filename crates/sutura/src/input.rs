@@ -9,6 +9,7 @@
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
+use crate::model::body::{Body, BodySpec, ColliderSpec};
 use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
@@ -73,6 +74,10 @@ pub enum Input {
     Restore(Vec<u8>),
     /// [`World::set_step_work`].
     StepWork(Option<f64>),
+    /// [`World::insert_body`].
+    InsertBody(BodySpec),
+    /// [`World::remove_body`].
+    RemoveBody(Handle<Body>),
     /// [`World::step`] by a time \[s\], and the state hash that it left.
     Step(f64, u64),
 }
@@ -103,6 +108,8 @@ impl Input {
             Input::InsertReel(spec) => drop(world.insert_reel(spec)?),
             Input::SetReel(reel, law) => world.set_reel(*reel, *law)?,
             Input::Restore(bytes) => world.restore(bytes)?,
+            Input::InsertBody(spec) => drop(world.insert_body(spec)?),
+            Input::RemoveBody(body) => world.remove_body(*body)?,
             Input::StepWork(most) => world.set_step_work(*most)?,
             Input::Step(dt, _) => return Ok(Some(world.step(*dt))),
         }
@@ -187,6 +194,10 @@ impl Recorder {
         insert_reel(spec: &ReelSpec) -> Handle<Reel>, Input::InsertReel(spec.clone());
         /// [`World::set_reel`].
         set_reel(reel: Handle<Reel>, law: ReelLaw) -> (), Input::SetReel(reel, law);
+        /// [`World::insert_body`].
+        insert_body(spec: &BodySpec) -> Handle<Body>, Input::InsertBody(spec.clone());
+        /// [`World::remove_body`].
+        remove_body(body: Handle<Body>) -> (), Input::RemoveBody(body);
         /// [`World::set_step_work`].
         set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
@@ -257,7 +268,7 @@ impl Replayed<'_> {
 /// First bytes of a recording: name and version. Version 4 is the same without the input 23, version 3 also without
 /// drag and without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const OLDEST: u32 = 2;
 
 impl Recording {
@@ -447,6 +458,8 @@ structure!(RodSpec {
     surface
 });
 structure!(Closure { twist });
+structure!(ColliderSpec { geometry, pose, density, surface });
+structure!(BodySpec { pose, colliders, velocity, angular_velocity });
 structure!(WeldSpec { places, rest });
 structure!(ReelSpec { rod, at_end, law, supply });
 structure!(GripSpec { rod, place, hold, drive, ramp });
@@ -467,7 +480,7 @@ variants!(Geometry {
     4 => Box { half_sides },
     5 => Mesh { vertices, triangles },
 });
-variants!(ShapeMotion { 0 => Fixed, 1 => Driven, 2 => Pushed { direction, force, speed_limit } });
+variants!(ShapeMotion { 0 => Fixed, 1 => Driven, 2 => Pushed { direction, force, speed_limit }, 3 => OnBody });
 variants!(Input {
     0 => Settings(settings),
     1 => Friction(a, b, friction),
@@ -493,4 +506,6 @@ variants!(Input {
     21 => SetMaterial(rod, material),
     22 => SetStretch(rod, stretch),
     23 => StepWork(most),
+    24 => InsertBody(spec),
+    25 => RemoveBody(body),
 });

@@ -13,12 +13,14 @@
 //! L-stable, and needs nothing of the substep before but accelerations. Where those are not known the method of
 //! Alexander (1977) takes a substep, with the same stability function. Theory 3.1.
 
+use crate::handle::Slots;
 use crate::math::{exp, log};
 use crate::model::Model;
-use crate::motion::Motion;
+use crate::motion::{BodyStart, Motion};
 use crate::params::Integrator;
 use crate::rod::strain;
-use crate::state::{Contact, History, State};
+use crate::row::movers::{momentum, place_shapes, turned_freely};
+use crate::state::{BodyState, Contact, History, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use core::ops::Range;
 use glam::DVec3;
@@ -114,6 +116,8 @@ pub(crate) fn carry(
     stage: &Stage,
     h: f64,
 ) {
+    motion.span = stage.span;
+    carry_bodies(model, state, motion, origin, stage, h);
     let Some([w0, w1]) = stage.weights else {
         carry_euler(model, state, motion, rods, h);
         return;
@@ -168,6 +172,71 @@ pub(crate) fn carry(
             motion.target_frame[e] = (exp(carried * span) * base).normalize();
             let on = ahead(&origin.angular_acceleration, &state.angular_acceleration, e) * (span * span);
             state.orientation[e] = (exp(on) * motion.target_frame[e]).normalize();
+        }
+    }
+}
+
+/// Sets up what bodies start from, and moves them to where they would come without contact.
+fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &State, stage: &Stage, h: f64) {
+    motion.bodies = Slots::default();
+    for slot in 0..model.bodies.len() as u32 {
+        let (Some(body), Some(now), Some(was)) = (model.bodies.at(slot), state.bodies.at(slot), origin.bodies.at(slot))
+        else {
+            continue;
+        };
+        let moments = body.mass.moments;
+        let spin = |b: &BodyState, momentum: DVec3| b.orientation * ((b.orientation.conjugate() * momentum) / moments);
+        let times = |v: DVec3, w: f64| if w == 0.0 { DVec3::ZERO } else { v * w };
+        let start = match stage.weights {
+            None => {
+                let (keep, keep_spin) = drag(model, h);
+                BodyStart {
+                    target: now.position + now.velocity * (h * keep),
+                    carried: now.velocity,
+                    base: now.orientation,
+                    momentum: now.angular_momentum * keep_spin,
+                }
+            }
+            Some([w0, w1]) => {
+                let (keep, keep_spin) = half_damping(model, h);
+                let base = was.position + times(was.velocity, keep * w0) + times(now.velocity, w1);
+                let carried = was.velocity * keep + times(was.acceleration, w0) + times(now.acceleration, w1);
+                let first = exp(times(spin(was, was.angular_momentum), keep_spin * w0));
+                let second = exp(times(spin(now, now.angular_momentum), w1));
+                BodyStart {
+                    target: base + carried * stage.span,
+                    carried,
+                    base: (second * (first * was.orientation)).normalize(),
+                    momentum: was.angular_momentum * keep_spin + times(was.torque, w0) + times(now.torque, w1),
+                }
+            }
+        };
+        let fall = model.settings.gravity * (stage.span * stage.span);
+        let orientation = turned_freely(moments, start.base, start.momentum, stage.span);
+        let now = state.bodies.at_mut(slot).expect("living");
+        (now.position, now.orientation) = (start.target + fall, orientation);
+        place_shapes(model, state, slot);
+        motion.bodies.put(slot, start);
+    }
+}
+
+/// Velocities and angular momenta of bodies from their motion.
+fn leave_rates_of_bodies(model: &Model, state: &mut State, motion: &Motion, stage: &Stage, h: f64) {
+    let over = 1.0 / (stage.span * stage.span);
+    for (slot, start) in motion.bodies.iter() {
+        let (Some(body), Some(now)) = (model.bodies.at(slot), state.bodies.at_mut(slot)) else { continue };
+        let reached = momentum(body.mass.moments, start.base, now, stage.span);
+        now.acceleration = (now.position - start.target) * (over * motion.heavier[0]);
+        now.torque = (reached - start.momentum) * (motion.heavier[1] / stage.span);
+        if stage.weights.is_some() {
+            let (keep, keep_spin) = if stage.last { half_damping(model, h) } else { (1.0, 1.0) };
+            now.velocity = (start.carried + now.acceleration * stage.span) * keep;
+            now.angular_momentum = reached * keep_spin;
+        } else {
+            let (keep, keep_spin) = fade(model, h);
+            let came_from = start.target - start.carried * (h * drag(model, h).0);
+            now.velocity = (now.position - came_from) * (keep / h);
+            now.angular_momentum = reached * keep_spin;
         }
     }
 }
@@ -232,6 +301,7 @@ fn heavier(x: f64) -> f64 {
 
 /// Velocities from the motion, with damping, and the accelerations that go with them where the next substep may ask.
 pub(crate) fn leave_rates(model: &Model, state: &mut State, motion: &Motion, rods: &[Blocks], stage: &Stage, h: f64) {
+    leave_rates_of_bodies(model, state, motion, stage, h);
     if model.settings.integrator == Integrator::TrBdf2 {
         let over = 1.0 / (stage.span * stage.span);
         state.acceleration.resize(model.mass.len(), DVec3::ZERO);

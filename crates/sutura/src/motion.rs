@@ -1,5 +1,6 @@
 //! What a solve starts from: where things were, where their velocities carry them, and what acts on them from outside.
 
+use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::Model;
 use glam::{DQuat, DVec3};
@@ -23,9 +24,25 @@ pub(crate) struct Motion {
     /// Factors on mass and on moments of inertia by which drag within the solve makes things heavier.
     pub heavier: [f64; 2],
 
+    /// Of bodies, by their slots.
+    pub bodies: Slots<BodyStart>,
+    /// Time by which accelerations act on velocities in the solve \[s\].
+    pub span: f64,
+
     /// Outside force and torque on particles and frames.
     pub force: Vec<DVec3>,
     pub torque: Vec<DVec3>,
+}
+
+/// What the solve of a body starts from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BodyStart {
+    /// Where velocity alone would carry its center of mass, and the velocity there.
+    pub target: DVec3,
+    pub carried: DVec3,
+    /// Orientation and angular momentum that the solve sets out with.
+    pub base: DQuat,
+    pub momentum: DVec3,
 }
 
 impl Motion {

@@ -93,6 +93,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             600.0 * model.mass.len() as f64 + 200.0 * (candidates.threads.len() + candidates.shapes.len()) as f64;
         row::shape::update_active_set(model, state, motion, rows, out.iterations == 1);
         brake::review(model, state, &mut rods.brakes);
+        if out.iterations > 1 {
+            rows.bodies.update(model, state, motion, candidates);
+        }
         row::system::zones(&mut rods.ranges, rows);
         let first = out.iterations == 1;
         let mut taken = 1.0;
@@ -127,7 +130,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         gained = work(rods, rows) - rods.work_built_up(model, state);
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
         let (turn, shift) = rods.largest_move(model);
-        let turn = max_or_nan(turn, rows.welds.turn_squared(rows.movers.count(), &rows.border)).sqrt();
+        let turn = max_or_nan(turn, rows.welds.turn_squared(rows.movers.count(), &rows.border));
+        let turn = max_or_nan(turn, rows.movers.turn_squared(&rows.border)).sqrt();
+        let shift = max_or_nan(shift, rows.movers.largest_move(model, &rows.border));
         scale = limit(state, motion, rods, candidates, turn);
         let slid = apply(model, state, rods, rows, scale, true);
         row::shape::predict(rows, &rods.step, scale);
@@ -164,6 +169,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             && rows.solved()
             && brake::settled(model, state, &rods.brakes)
             && row::shape::converged(model, state, motion, rows, &rods.step, out.iterations)
+            && row::body::converged(&rows.bodies.rows)
             && !row::extend(model, state, motion, candidates, rows)
         {
             out.converged = true;
@@ -230,5 +236,5 @@ fn limit(state: &State, motion: &Motion, rods: &RodScratch, candidates: &Candida
 fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> f64 {
     rods.apply(model, state, scale, anew);
     rows.welds.apply(state, rows.movers.count(), &rows.border, scale);
-    rows.movers.apply(state, &rows.border, scale)
+    rows.movers.apply(model, state, &rows.border, scale)
 }

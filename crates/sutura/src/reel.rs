@@ -387,7 +387,7 @@ fn renumber_state(
             let (element, s) = place(element, s);
             Site::Thread { element, s }
         }
-        Site::Shape { .. } => site,
+        Site::Shape { .. } | Site::Surface { .. } => site,
     });
 }
 

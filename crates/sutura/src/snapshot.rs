@@ -8,7 +8,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{Contact, Contacts, GripState, History, LoadState, ReelState, Site, State};
+use crate::state::{BodyState, Contact, Contacts, GripState, History, LoadState, ReelState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
@@ -191,6 +191,7 @@ variants!(LoadKind {
 });
 structure!(Pose { position, orientation });
 structure!(LoadState { rod, kind });
+structure!(BodyState { position, orientation, velocity, angular_momentum, acceleration, torque });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
 structure!(GripState {
     rod,
@@ -209,7 +210,35 @@ structure!(GripState {
     force,
     torque
 });
-structure!(State {
+/// All of a state but bodies and their contacts, which a world without bodies does not write.
+macro_rules! state {
+    ($($field:ident),* $(,)?) => {
+        impl Bytes for State {
+            fn put(&self, out: &mut Vec<u8>) {
+                let State { $($field,)* bodies } = self;
+                $($field.put(out);)*
+                if bodies.len() > 0 {
+                    bodies.put(out);
+                    self.contacts.bodies().to_vec().put(out);
+                }
+            }
+            fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
+                let mut state = State { $($field: Bytes::take(input)?,)* bodies: Slots::default() };
+                if !input.left.is_empty() {
+                    state.bodies = Bytes::take(input)?;
+                    let more = Vec::<Contact>::take(input)?;
+                    let all: Vec<Contact> = state.contacts.iter().copied().chain(more).collect();
+                    state.contacts.set(all.into_iter());
+                }
+                Ok(state)
+            }
+        }
+    };
+}
+
+variants!(Site { 0 => Thread { element, s }, 1 => Shape { shape }, 2 => Surface { shape, at } });
+structure!(Contact { a, b, normal, normal_force, friction, residual_slip, sliding });
+state!(
     time,
     last_h,
     accepted_in_row,
@@ -231,7 +260,7 @@ structure!(State {
     loads,
     reels,
     contacts,
-});
+);
 
 /// Contacts of threads with threads, and those with shapes, each with its count.
 impl Bytes for Contacts {

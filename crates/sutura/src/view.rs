@@ -3,13 +3,14 @@
 
 use crate::math::{Pose, log};
 use crate::model::Model;
+use crate::model::body::{BodyModel, MassProperties};
 use crate::model::material::{Material, SectionStiffness};
 use crate::model::rod::{RodModel, Stretch};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::rod::energy::{Energy, energy};
-use crate::state::{Site, State};
+use crate::state::{BodyState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -134,6 +135,12 @@ impl<'a> View<'a> {
             slot: slot as usize,
         })
     }
+    /// The living bodies in slot order.
+    pub fn bodies(&self) -> impl Iterator<Item = BodyView<'a>> + use<'a> {
+        let (bodies, state, gravity) = (&self.model.bodies, self.state, self.model.settings.gravity);
+        let view = move |(slot, model)| Some(BodyView { model, state: state.bodies.at(slot)?, gravity, slot });
+        bodies.iter().filter_map(view)
+    }
     /// The living welds in slot order.
     pub fn welds(&self) -> impl Iterator<Item = WeldView<'a>> + use<'a> {
         let (model, state) = (self.model, self.state);
@@ -151,7 +158,7 @@ impl<'a> View<'a> {
                 let first = model.rods.at(rod).map_or(0, |r| r.first);
                 ContactSide::Thread { rod: rod as usize, element: (element - first) as usize, s }
             }
-            Site::Shape { shape } => ContactSide::Shape { shape: shape as usize },
+            Site::Shape { shape } | Site::Surface { shape, .. } => ContactSide::Shape { shape: shape as usize },
         };
         let point = move |site: Site| match site {
             Site::Thread { element, s } => {
@@ -159,6 +166,7 @@ impl<'a> View<'a> {
                 state.position[e].lerp(state.position[e + 1], s)
             }
             Site::Shape { shape } => state.shape_pose[shape as usize].position,
+            Site::Surface { shape, at } => state.shape_pose[shape as usize].transform_point(at),
         };
         state.contacts.iter().filter(|c| c.normal_force > 0.0).map(move |c| ContactView {
             a: side(c.a),
@@ -172,6 +180,62 @@ impl<'a> View<'a> {
     pub(crate) fn rod_at(&self, slot: u32) -> Option<RodView<'a>> {
         let (model, state) = (self.model, self.state);
         model.rods.at(slot).map(|rod| RodView { model, state, rod, slot })
+    }
+}
+
+/// One free body at one accepted state.
+#[derive(Clone, Copy)]
+pub struct BodyView<'a> {
+    model: &'a BodyModel,
+    state: &'a BodyState,
+    gravity: DVec3,
+    slot: u32,
+}
+
+impl<'a> BodyView<'a> {
+    /// Its slot, unique among living bodies ([`Handle::index`](crate::Handle::index)).
+    pub fn slot(&self) -> usize {
+        self.slot as usize
+    }
+    /// Where its frame is, `world_from_body`.
+    pub fn pose(&self) -> Pose {
+        let mass = &self.model.mass;
+        Pose::new(self.state.position, self.state.orientation).compose(&Pose::new(mass.center, mass.axes).inverse())
+    }
+    /// Its mass properties.
+    pub fn mass(&self) -> MassProperties {
+        self.model.mass
+    }
+    /// Its center of mass in the world \[m\].
+    pub fn center(&self) -> DVec3 {
+        self.state.position
+    }
+    /// Velocity of its center of mass \[m/s\].
+    pub fn velocity(&self) -> DVec3 {
+        self.state.velocity
+    }
+    /// Angular velocity in world axes \[rad/s\].
+    pub fn angular_velocity(&self) -> DVec3 {
+        let q = self.state.orientation;
+        q * ((q.conjugate() * self.state.angular_momentum) / self.model.mass.moments)
+    }
+    /// Linear momentum \[kg m/s\].
+    pub fn momentum(&self) -> DVec3 {
+        self.state.velocity * self.model.mass.mass
+    }
+    /// Angular momentum about its center of mass, in world axes \[N m s\].
+    pub fn angular_momentum(&self) -> DVec3 {
+        self.state.angular_momentum
+    }
+    /// Mechanical energy: of motion and spin, and in the gravity field.
+    pub fn energy(&self) -> Energy {
+        let (mass, v) = (self.model.mass.mass, self.state.velocity);
+        let kinetic = 0.5 * mass * v.length_squared() + 0.5 * self.angular_velocity().dot(self.state.angular_momentum);
+        Energy { kinetic, gravity: -mass * self.gravity.dot(self.state.position), ..Energy::default() }
+    }
+    /// Slots of its shapes ([`ShapeView::slot`]).
+    pub fn shapes(&self) -> impl Iterator<Item = usize> + use<'a> {
+        self.model.shapes.iter().map(|(slot, _)| *slot as usize)
     }
 }
 

@@ -26,6 +26,8 @@ pub(crate) struct Candidates {
     pub threads: Vec<(u32, u32)>,
     /// Shape slot and element.
     pub shapes: Vec<(u32, u32)>,
+    /// Slots of two shapes, one of them of a body.
+    pub solids: Vec<(u32, u32)>,
     /// Boxes of the living shapes, all the way from the start of the substep to the iterate, in the order of their
     /// slots.
     shape_bounds: Vec<(DVec3, DVec3)>,
@@ -144,7 +146,7 @@ fn arcs(model: &Model, arc: &mut Vec<f64>) {
 /// iterate, with room for what Newton will add.
 pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: &mut Candidates) {
     let Motion { start, start_shape_pose, .. } = motion;
-    let Candidates { threads, shapes, shape_bounds, radius, arc, tree, turned, straight } = candidates;
+    let Candidates { threads, shapes, solids, shape_bounds, radius, arc, tree, turned, straight } = candidates;
     let n = model.mass.len();
     arcs(model, arc);
     turning(model, [start, &state.position], turned);
@@ -186,6 +188,21 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
         });
     }
     shapes.sort_unstable();
+    solids.clear();
+    if model.bodies.len() == 0 {
+        return;
+    }
+    let living = || model.shapes.iter().zip(&*shape_bounds);
+    for (k, ((a, first), (lo, hi))) in living().enumerate() {
+        for ((b, second), (other_lo, other_hi)) in living().skip(k + 1) {
+            let size = [a, b].iter().filter_map(|s| model.body_of(*s)).map(|b| b.size()).fold(f64::INFINITY, f64::min);
+            let room = DVec3::splat(params::MARGIN * size);
+            let near = size.is_finite() && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
+            if near && first.body != second.body {
+                solids.push((a, b));
+            }
+        }
+    }
 }
 
 /// Why a motion is refused, and because of which rods.
@@ -313,7 +330,7 @@ fn outran(model: &Model, state: &State, candidates: &mut Candidates) -> bool {
         .shapes
         .iter()
         .zip(&candidates.shape_bounds)
-        .filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. }))
+        .filter(|((_, s), _)| matches!(s.motion, ShapeMotion::Pushed { .. } | ShapeMotion::OnBody))
         .any(|((slot, shape), (lo, hi))| {
             let (now_lo, now_hi) = shape.collider.bounds(&state.shape_pose[slot as usize]);
             now_lo.cmplt(*lo).any() || now_hi.cmpgt(*hi).any()

@@ -4,10 +4,17 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::shape::Geometry;
 use crate::segment;
-use glam::DVec3;
+use core::f64::consts::FRAC_1_SQRT_2;
+use glam::{DMat3, DQuat, DVec3};
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::query::{PointQuery, PointQueryWithLocation, Ray, RayCast};
-use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder, Shape, TriMesh, TriMeshFlags, TrianglePointLocation};
+use parry3d_f64::math::Pose3 as ParryPose;
+use parry3d_f64::query::{
+    ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, PersistentQueryDispatcher, PointQuery,
+    PointQueryWithLocation, Ray, RayCast,
+};
+use parry3d_f64::shape::{
+    Ball, Capsule, Cuboid, Cylinder, HalfSpace, Shape, TriMesh, TriMeshFlags, TrianglePointLocation,
+};
 
 /// A geometry ready for queries.
 pub(crate) enum Collider {
@@ -72,7 +79,86 @@ fn from_parry(p: DVec3) -> DVec3 {
     DVec3::new(p.x, -p.z, p.y)
 }
 
+/// The turn that [`from_parry`] is.
+const FROM_PARRY: DQuat = DQuat::from_xyzw(FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2);
+
+/// A pose in parry's axes.
+fn pose_in_parry(pose: &Pose) -> ParryPose {
+    ParryPose::from_parts(pose.position, pose.orientation * FROM_PARRY)
+}
+
+/// A place where two solids touch or nearly do.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Touch {
+    /// In the frame of each.
+    pub at: [DVec3; 2],
+    /// Unit normal in the world, from the second toward the first.
+    pub normal: DVec3,
+}
+
+/// Memory of [`touches`].
+#[derive(Default)]
+pub(crate) struct Manifolds {
+    one: ContactManifold<(), ()>,
+    many: Vec<ContactManifold<(), ()>>,
+    workspace: Option<ContactManifoldsWorkspace>,
+}
+
+/// Finds the places where two solids are nearer than `reach`: up to four a pair of convex ones.
+pub(crate) fn touches(
+    [a, b]: [&Collider; 2],
+    [pose_a, pose_b]: [&Pose; 2],
+    reach: f64,
+    memory: &mut Manifolds,
+    mut found: impl FnMut(Touch),
+) {
+    let relative = pose_in_parry(pose_a).inv_mul(&pose_in_parry(pose_b));
+    let Manifolds { one, many, workspace } = memory;
+    let ground = HalfSpace::new(DVec3::Y);
+    let dispatcher = DefaultQueryDispatcher;
+    let mut take = |manifold: &ContactManifold<(), ()>| {
+        let normal = -(pose_a.orientation * from_parry(manifold.local_n1));
+        for p in manifold.points.iter().filter(|p| p.dist < reach) {
+            found(Touch { at: [from_parry(p.local_p1), from_parry(p.local_p2)], normal });
+        }
+    };
+    let shape = |c: &'_ Collider| matches!(c, Collider::Surface(_));
+    let dynamic = |c| -> &dyn Shape {
+        match c {
+            &Collider::Plane => &ground,
+            Collider::Solid(solid) => &**solid,
+            Collider::Surface(surface) => &surface.mesh,
+        }
+    };
+    // A manifold that is found again depends on what it was before, and so would the bits.
+    if shape(a) || shape(b) {
+        many.clear();
+        *workspace = None;
+        let done = dispatcher.contact_manifolds(&relative, dynamic(a), dynamic(b), reach, many, workspace);
+        if done.is_ok() {
+            many.iter().for_each(&mut take);
+        }
+    } else {
+        one.clear();
+        let done = dispatcher.contact_manifold_convex_convex(&relative, dynamic(a), dynamic(b), None, None, reach, one);
+        if done.is_ok() {
+            take(one);
+        }
+    }
+}
+
 impl Collider {
+    /// Mass, center of mass and inertia about it, in the frame of the collider.
+    pub fn mass_properties(&self, density: f64) -> (f64, DVec3, DMat3) {
+        let p = match self {
+            Collider::Plane => return (0.0, DVec3::ZERO, DMat3::ZERO),
+            Collider::Solid(solid) => solid.mass_properties(density),
+            Collider::Surface(surface) => surface.mesh.mass_properties(density),
+        };
+        let turn = DMat3::from_quat(FROM_PARRY);
+        (p.mass(), from_parry(p.local_com), turn * p.reconstruct_inertia_matrix() * turn.transpose())
+    }
+
     pub fn new(geometry: &Geometry) -> Result<Self, Error> {
         Ok(match geometry {
             Geometry::Plane => Collider::Plane,
@@ -216,6 +302,15 @@ impl Collider {
         }
         let (s, d, _) = if lo.1.value < hi.1.value { lo } else { hi };
         (s > 0.0 && s < 1.0 && d.value < below).then_some((s, d))
+    }
+
+    /// Distance from the origin beyond which nothing of a solid is.
+    pub fn reach(&self) -> f64 {
+        if matches!(self, Collider::Plane) {
+            return 0.0;
+        }
+        let (lo, hi) = self.bounds(&Pose::IDENTITY);
+        lo.abs().max(hi.abs()).length()
     }
 
     /// World box that holds the shape.

@@ -1,5 +1,6 @@
 //! What does not change while the world steps: topology, rest shape, mass, compliance, geometry.
 
+pub mod body;
 pub(crate) mod collider;
 pub mod grip;
 pub mod material;
@@ -13,6 +14,7 @@ pub mod weld;
 use crate::arrays::element_arrays;
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
+use body::BodyModel;
 use glam::{DQuat, DVec3};
 use grip::{LoadKind, LoadState};
 use material::{Material, SectionStiffness};
@@ -34,6 +36,7 @@ pub struct Model {
     pub(crate) step_work: Option<f64>,
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
+    pub(crate) bodies: Slots<BodyModel>,
     pub(crate) welds: Slots<WeldModel>,
     /// What was put into the world since the last step, which the next one looks at.
     pub(crate) placed: Placed,
@@ -101,6 +104,8 @@ pub(crate) struct ShapeModel {
     pub collider: collider::Collider,
     pub surface: u32,
     pub motion: ShapeMotion,
+    /// Slot of the body that it is part of.
+    pub body: Option<u32>,
     /// Whether a mesh is closed, so that it has an inside; of the other shapes true.
     pub closed: bool,
     /// Whether part of a mesh is a container, around which everything is solid.
@@ -110,6 +115,10 @@ pub(crate) struct ShapeModel {
 }
 
 impl Model {
+    /// The body that a shape is part of.
+    pub(crate) fn body_of(&self, shape: u32) -> Option<&BodyModel> {
+        self.bodies.at(self.shapes.at(shape)?.body?)
+    }
     /// Friction between two surfaces.
     pub(crate) fn friction_between(&self, a: u32, b: u32) -> Friction {
         let key = (a.min(b), a.max(b));

@@ -83,6 +83,8 @@ pub enum ShapeMotion {
         /// Speed at which it moves when nothing resists \[m/s\], > 0.
         speed_limit: f64,
     },
+    /// The body that it is part of; for shapes that [`World::insert_body`](crate::World::insert_body) makes.
+    OnBody,
 }
 
 impl ShapeSpec {

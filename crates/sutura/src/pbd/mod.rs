@@ -105,6 +105,9 @@ pub(crate) fn unknown(model: &Model, state: &State) -> Option<&'static str> {
     if model.shapes.iter().any(|(_, s)| matches!(s.motion, ShapeMotion::Pushed { .. })) {
         return Some("a shape pushed by a force");
     }
+    if model.bodies.iter().next().is_some() {
+        return Some("a free body");
+    }
     state.grips.iter().any(|(_, g)| g.drive != Drive::Pose).then_some("a grip driven by force")
 }
 

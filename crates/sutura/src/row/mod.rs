@@ -3,6 +3,7 @@
 //! system: pushed shapes and welds.
 
 pub(crate) mod active_set;
+pub(crate) mod body;
 pub(crate) mod border;
 pub(crate) mod delassus;
 pub(crate) mod dense;
@@ -27,6 +28,7 @@ use crate::state::State;
 pub(crate) struct Rows {
     pub shapes: Vec<shape::ShapeRow>,
     pub threads: Vec<thread::ThreadRow>,
+    pub bodies: body::BodyRows,
     pub movers: movers::Movers,
     pub welds: weld::Welds,
     pub border: border::Border,
@@ -38,7 +40,7 @@ pub(crate) struct Rows {
 
 impl Rows {
     pub fn is_empty(&self) -> bool {
-        self.shapes.is_empty() && self.threads.is_empty()
+        self.shapes.is_empty() && self.threads.is_empty() && self.bodies.rows.is_empty()
     }
 
     /// Whether the small problem was solved well enough for the step to count.
@@ -75,6 +77,7 @@ pub(crate) fn prepare(
 ) {
     thread::prepare(model, state, motion, candidates, rows);
     shape::prepare(model, state, motion, candidates, rows, length);
+    rows.bodies.prepare(model, state, motion, candidates);
 }
 
 /// Adds rows that the iterate calls for. Whether there are any.
@@ -87,6 +90,11 @@ pub(crate) fn extend(model: &Model, state: &State, motion: &Motion, candidates: 
 pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mut Rows) {
     let mut contacts = core::mem::take(&mut state.contacts);
     let threads = thread::contacts(state, motion, &rows.threads);
-    contacts.set(threads.chain(shape::contacts(model, state, motion, &mut rows.shapes)));
+    let Rows { shapes, bodies, .. } = rows;
+    contacts.set(threads.chain(shape::contacts(model, state, motion, shapes)).chain(body::contacts(
+        state,
+        motion,
+        &mut bodies.rows,
+    )));
     state.contacts = contacts;
 }

@@ -1,34 +1,91 @@
-//! Shapes that contact moves: their unknowns are the first of the border ([`border`](crate::row::border)), coupled to
-//! all threads that touch them.
+//! What contact moves beside threads: its unknowns are the first of the border ([`border`](crate::row::border)),
+//! coupled to all threads that touch it.
 //!
 //! A shape that a force pushes along a line has one. It has no mass; the force law `F (1 - v / v_limit)` is its
-//! damping, taken implicitly.
+//! damping, taken implicitly. A free body has six: the place of its center of mass and its turn. With Omega the mean
+//! angular velocity in body axes over the solve and R_m the orientation halfway,
+//!
+//! ```text
+//! Omega = log(q0^-1 q) / h,    R_m = R(q0 exp(h Omega / 2)),    L = R_m I Omega
+//! ```
+//!
+//! its angular momentum keeps to L = L0 + h tau: momentum is kept exactly, and a free top is of second order in h.
+//! The matrix has R_m I R_m^T / h^2, which leaves out a part of the order h |Omega|.
 
+use crate::math::{Pose, exp, log, skew};
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
+use crate::motion::Motion;
 use crate::row::border::Border;
 use crate::row::side::Moves;
-use crate::state::State;
-use glam::{DMat3, DVec3};
+use crate::state::{BodyState, State};
+use glam::{DMat3, DQuat, DVec3};
 
-/// A shape on a line, and the number of its unknown.
+/// A shape on a line.
 struct Slider {
     shape: u32,
     direction: DVec3,
 }
 
-/// The shapes that may move in the substep.
+/// What may move in the substep. Unknowns are those of the sliders, then those of the bodies.
 #[derive(Default)]
 pub(crate) struct Movers {
     sliders: Vec<Slider>,
+    /// Slots of the living bodies, and their centers of mass at the iterate.
+    bodies: Vec<(u32, DVec3)>,
+    /// Body of each shape, counted here, by its slot.
+    body_of: Vec<Option<u32>>,
     /// Length of the solve \[s\].
     h: f64,
 }
 
+/// Unknowns of a body.
+const SIX: usize = 6;
+
+/// Mean orientation, inertia about it in world axes and angular momentum of a body that has come from `base` to `q`
+/// within `span`.
+fn rotation(moments: DVec3, base: DQuat, q: DQuat, span: f64) -> (DMat3, DVec3) {
+    let turn = log(base.conjugate() * q);
+    let middle = DMat3::from_quat(base * exp(turn * 0.5));
+    let inertia = middle * DMat3::from_diagonal(moments) * middle.transpose();
+    (inertia, middle * (moments * turn) / span)
+}
+
+/// Orientation after `span` of a body without torque that has this angular momentum.
+pub(crate) fn turned_freely(moments: DVec3, base: DQuat, momentum: DVec3, span: f64) -> DQuat {
+    let mut turn = DVec3::ZERO;
+    for _ in 0..20 {
+        let middle = base * exp(turn * 0.5);
+        let next = (middle.conjugate() * momentum) / moments * span;
+        let done = (next - turn).length() <= 1e-15 * next.length();
+        turn = next;
+        if done {
+            break;
+        }
+    }
+    (base * exp(turn)).normalize()
+}
+
+/// Angular momentum of a body that has come from `base` within `span`.
+pub(crate) fn momentum(moments: DVec3, base: DQuat, body: &BodyState, span: f64) -> DVec3 {
+    rotation(moments, base, body.orientation, span).1
+}
+
+/// Puts the shapes of a body where it is.
+pub(crate) fn place_shapes(model: &Model, state: &mut State, slot: u32) {
+    let (Some(model), Some(body)) = (model.bodies.at(slot), state.bodies.at(slot)) else { return };
+    let pose = Pose::new(body.position, body.orientation);
+    for (shape, local) in &model.shapes {
+        state.shape_pose[*shape as usize] = pose.compose(local);
+    }
+}
+
 impl Movers {
-    /// Lists the shapes that may move. A pushed shape without force stays.
-    pub fn begin(&mut self, model: &Model, h: f64) {
+    /// Lists what may move. A pushed shape without force stays.
+    pub fn begin(&mut self, model: &Model, state: &State, h: f64) {
         self.sliders.clear();
+        self.bodies.clear();
+        self.body_of.clear();
         self.h = h;
         for (slot, shape) in model.shapes.iter() {
             if let ShapeMotion::Pushed { direction, force, .. } = shape.motion
@@ -37,15 +94,26 @@ impl Movers {
                 self.sliders.push(Slider { shape: slot, direction });
             }
         }
+        if model.bodies.len() == 0 {
+            return;
+        }
+        self.body_of.resize(model.shapes.len(), None);
+        for (slot, body) in model.bodies.iter() {
+            let number = self.bodies.len() as u32;
+            self.bodies.push((slot, state.bodies.at(slot).map_or(DVec3::ZERO, |b| b.position)));
+            for (shape, _) in &body.shapes {
+                self.body_of[*shape as usize] = Some(number);
+            }
+        }
     }
 
     /// Number of unknowns.
     pub fn count(&self) -> usize {
-        self.sliders.len()
+        self.sliders.len() + SIX * self.bodies.len()
     }
 
-    /// Puts what acts on the shapes beside contact into the border.
-    pub fn assemble(&self, model: &Model, state: &State, start: &[crate::math::Pose], border: &mut Border) {
+    /// Puts what acts on them beside contact into the border.
+    pub fn assemble(&mut self, model: &Model, state: &State, motion: &Motion, border: &mut Border) {
         let h = self.h;
         for (k, s) in self.sliders.iter().enumerate() {
             let Some(ShapeMotion::Pushed { force, speed_limit, .. }) = model.shapes.at(s.shape).map(|s| s.motion)
@@ -53,26 +121,101 @@ impl Movers {
                 continue;
             };
             let damper = force / (speed_limit * h);
-            let moved = s.direction.dot(state.shape_pose[s.shape as usize].position - start[s.shape as usize].position);
+            let at = s.shape as usize;
+            let moved = s.direction.dot(state.shape_pose[at].position - motion.start_shape_pose[at].position);
             border.add_own(k, k, damper);
             border.push(k, force - damper * moved);
         }
+        let span = motion.span;
+        for (number, (slot, center)) in self.bodies.iter_mut().enumerate() {
+            let first = self.sliders.len() + SIX * number;
+            let (Some(body), Some(start)) = (state.bodies.at(*slot), motion.bodies.at(*slot)) else { continue };
+            let mass = &model.bodies.at(*slot).expect("listed").mass;
+            *center = body.position;
+            let w = mass.mass * motion.heavier[0] / (span * span);
+            let force = model.settings.gravity * mass.mass + (start.target - body.position) * w;
+            let (inertia, momentum) = rotation(mass.moments, start.base, body.orientation, span);
+            let over = motion.heavier[1] / (span * span);
+            let torque = (start.momentum - momentum) * (motion.heavier[1] / span);
+            for i in 0..3 {
+                border.add_own(first + i, first + i, w);
+                border.push(first + i, force[i]);
+                border.push(first + 3 + i, torque[i]);
+                for j in 0..3 {
+                    border.add_own(first + 3 + i, first + 3 + j, inertia.col(j)[i] * over);
+                }
+            }
+        }
     }
 
-    /// How a shape's material point moves with its unknowns; none where nothing moves the shape.
-    pub fn moves(&self, shape: u32) -> Option<Moves> {
+    /// How the material of a shape that is at `point` moves with its unknowns; none where nothing moves the shape.
+    pub fn moves(&self, shape: u32, point: DVec3) -> Option<Moves> {
+        if let Some(number) = self.body_of.get(shape as usize).copied().flatten() {
+            let arm = point - self.bodies[number as usize].1;
+            // A turn phi moves it by phi x arm.
+            let turns = -skew(arm);
+            let columns = [DVec3::X, DVec3::Y, DVec3::Z, turns.col(0), turns.col(1), turns.col(2)];
+            return Some(Moves::new(self.sliders.len() + SIX * number as usize, &columns));
+        }
         let k = self.sliders.iter().position(|s| s.shape == shape)?;
         Some(Moves::new(k, &[self.sliders[k].direction]))
     }
 
-    /// Move of a point of a shape in this Newton iteration so far \[m\].
-    pub fn moved(&self, shape: u32, border: &Border) -> DVec3 {
-        self.moves(shape).map_or(DVec3::ZERO, |m| m.along(border))
+    /// Move of the material of a shape at a point in this Newton iteration so far \[m\].
+    pub fn moved(&self, shape: u32, point: DVec3, border: &Border) -> DVec3 {
+        self.moves(shape, point).map_or(DVec3::ZERO, |m| m.along(border))
     }
 
-    /// Adds a contact of a shape with the element `e`: stiffness, force on the thread and weights of its particles.
-    pub fn add(&self, shape: u32, e: usize, stiffness: &DMat3, force: DVec3, weights: [f64; 2], border: &mut Border) {
-        let Some(moves) = self.moves(shape) else { return };
+    /// Greatest turn of a body in the last step \[rad\], squared.
+    pub fn turn_squared(&self, border: &Border) -> f64 {
+        let turn = |number: usize| {
+            let first = self.sliders.len() + SIX * number + 3;
+            DVec3::new(border.step(first), border.step(first + 1), border.step(first + 2)).length_squared()
+        };
+        (0..self.bodies.len()).map(turn).fold(0.0, crate::math::max_or_nan)
+    }
+
+    /// Greatest move of a body in the last step, in hundredths of its size.
+    pub fn largest_move(&self, model: &Model, border: &Border) -> f64 {
+        let moved = |(number, (slot, _)): (usize, &(u32, DVec3))| {
+            let first = self.sliders.len() + SIX * number;
+            let step = DVec3::new(border.step(first), border.step(first + 1), border.step(first + 2));
+            step.length() / (0.01 * model.bodies.at(*slot).expect("listed").size())
+        };
+        self.bodies.iter().enumerate().map(moved).fold(0.0, crate::math::max_or_nan)
+    }
+
+    /// Takes their part of the step; the largest move of a pushed shape \[m\].
+    pub fn apply(&self, model: &Model, state: &mut State, border: &Border, scale: f64) -> f64 {
+        let mut far = 0.0f64;
+        for (k, s) in self.sliders.iter().enumerate() {
+            let step = border.step(k) * scale;
+            state.shape_pose[s.shape as usize].position += s.direction * step;
+            far = far.max(step.abs());
+        }
+        for (number, (slot, _)) in self.bodies.iter().enumerate() {
+            let first = self.sliders.len() + SIX * number;
+            let vector = |k: usize| DVec3::new(border.step(k), border.step(k + 1), border.step(k + 2)) * scale;
+            let body = state.bodies.at_mut(*slot).expect("listed");
+            body.position += vector(first);
+            body.orientation = (exp(vector(first + 3)) * body.orientation).normalize();
+            place_shapes(model, state, *slot);
+        }
+        far
+    }
+
+    /// Adds a contact of a shape with the element `e`, at a point of its surface: stiffness, force on the thread and
+    /// weights of its particles.
+    pub fn add(
+        &self,
+        (shape, point): (u32, DVec3),
+        e: usize,
+        stiffness: &DMat3,
+        force: DVec3,
+        weights: [f64; 2],
+        border: &mut Border,
+    ) {
+        let Some(moves) = self.moves(shape, point) else { return };
         for (k, direction) in moves.columns() {
             let pull = *stiffness * direction;
             border.link(k, 2 * e, -pull * weights[0]);
@@ -82,16 +225,5 @@ impl Movers {
             }
             border.push(k, -direction.dot(force));
         }
-    }
-
-    /// Moves the shapes by their part of the update; the largest move \[m\].
-    pub fn apply(&self, state: &mut State, border: &Border, scale: f64) -> f64 {
-        let mut far = 0.0f64;
-        for (k, s) in self.sliders.iter().enumerate() {
-            let step = border.step(k) * scale;
-            state.shape_pose[s.shape as usize].position += s.direction * step;
-            far = far.max(step.abs());
-        }
-        far
     }
 }

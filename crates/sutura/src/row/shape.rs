@@ -68,8 +68,9 @@ pub(crate) struct ShapeRow {
     smooth: Option<DVec3>,
     /// At a particle whose foot is that of an edge row: see [`leave_to_edges`].
     beside_edge: bool,
-    /// Outward direction of the surface and gap at the last look.
+    /// Outward direction of the surface, the point of it that is touched, and gap at the last look.
     normal: DVec3,
+    surface: DVec3,
     gap: f64,
     /// Distance from the surface at the start.
     before: Distance,
@@ -187,7 +188,7 @@ impl ShapeRow {
         let (e, force) = (self.element as usize, self.rim * size);
         right[2 * e] += force * (1.0 - self.s);
         right[2 * e + 2] += force * self.s;
-        if let Some(moves) = movers.moves(self.shape) {
+        if let Some(moves) = movers.moves(self.shape, self.surface) {
             moves.load(-force, border);
         }
     }
@@ -293,6 +294,7 @@ impl Pair<'_> {
             smooth,
             beside_edge: false,
             normal: across(before.normal, smooth),
+            surface: DVec3::ZERO,
             gap,
             before,
             start_gap: gap,
@@ -316,7 +318,7 @@ pub(crate) fn prepare(model: &Model, state: &State, motion: &Motion, candidates:
     let Motion { start, start_shape_pose, .. } = motion;
     let (rows, movers) = (&mut rows.shapes, &mut rows.movers);
     rows.clear();
-    movers.begin(model, h);
+    movers.begin(model, state, h);
     let x = &state.position;
     let mut last = None;
     for (slot, e) in &candidates.shapes {
@@ -520,6 +522,7 @@ fn evaluate(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -
         shape.collider.follow((&motion.start_shape_pose[k], from, row.before), (&state.shape_pose[k], p), row.normal);
     row.normal = across(d.normal, row.smooth);
     row.gap = d.value - row.radius * (1.0 + 2.0 * params::KEEP);
+    row.surface = p - row.normal * row.radius;
     p
 }
 
@@ -621,7 +624,7 @@ pub(crate) fn assemble(
 ) {
     let RodScratch { system, rhs, .. } = rods;
     rows.border.clear(rows.movers.count() + rows.welds.count());
-    rows.movers.assemble(model, state, &motion.start_shape_pose, &mut rows.border);
+    rows.movers.assemble(model, state, motion, &mut rows.border);
     for row in &mut rows.shapes {
         if !row.firm {
             evaluate(model, state, motion, row);
@@ -637,7 +640,7 @@ pub(crate) fn assemble(
         system.diagonal[2 * e] += stiffness * (a * a);
         system.diagonal[2 * e + 2] += stiffness * (b * b);
         system.after[2 * e] += stiffness * (a * b);
-        rows.movers.add(row.shape, e, &stiffness, force, [a, b], &mut rows.border);
+        rows.movers.add((row.shape, row.surface), e, &stiffness, force, [a, b], &mut rows.border);
         row.tangent = stiffness;
         row.followed = 0.0;
     }
@@ -646,7 +649,7 @@ pub(crate) fn assemble(
 /// Move of a row's place against its shape along the last step.
 fn moved(row: &ShapeRow, step: &[DVec3], movers: &Movers, border: &Border) -> DVec3 {
     let e = row.element as usize;
-    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, border)
+    step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, row.surface, border)
 }
 
 /// Notes the forces that a step of this length predicts for the firm rows.
@@ -683,7 +686,8 @@ pub(crate) fn add_entries(
     let (movers, border) = shared;
     for (k, row) in rows.iter_mut().enumerate().filter(|(_, r)| !r.firm) {
         let e = row.element as usize;
-        let moved = step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, border);
+        let moved =
+            step[2 * e] * (1.0 - row.s) + step[2 * e + 2] * row.s - movers.moved(row.shape, row.surface, border);
         let gap = row.gap + row.normal.dot(moved);
         if row.normal_force <= 0.0 && !row.activate && gap > params::PRUNE * row.radius {
             (row.normal_force, row.friction) = (0.0, DVec3::ZERO);
@@ -695,7 +699,7 @@ pub(crate) fn add_entries(
         let slip = slip(state, motion, row) + moved - row.friction_before * row.effective_compliance;
         let (allowed, normal) =
             regain(row.start_gap, (row.force_before / row.hardness).sqrt(), row.effective_compliance);
-        let shape = movers.moves(row.shape).map_or(Side::Still, |moves| Side::Shared(moves.against(axes)));
+        let shape = movers.moves(row.shape, row.surface).map_or(Side::Still, |moves| Side::Shared(moves.against(axes)));
         entries.push(Entry {
             source: Source::Shape(k as u32),
             island: 0,

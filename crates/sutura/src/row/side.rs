@@ -82,6 +82,12 @@ impl Moves {
         (0..usize::from(self.count)).map(move |k| (first + k, columns[k]))
     }
 
+    /// Along axes.
+    pub fn toward(&self, axes: [DVec3; 3]) -> Self {
+        let along = |v: DVec3| DVec3::from_array(axes.map(|a| v.dot(a)));
+        Moves { columns: self.columns.map(along), ..*self }
+    }
+
     /// The other way round, along axes.
     pub fn against(&self, axes: [DVec3; 3]) -> Self {
         let along = |v: DVec3| DVec3::from_array(axes.map(|a| (-v).dot(a)));

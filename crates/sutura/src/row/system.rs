@@ -18,7 +18,7 @@ use crate::row::border::Border;
 use crate::row::dense::Dense;
 use crate::row::side::{Endpoint, Side};
 use crate::row::sparse::Sparse;
-use crate::row::{Rows, shape, thread};
+use crate::row::{Rows, body, shape, thread};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -28,6 +28,7 @@ use glam::{DMat3, DVec3};
 pub(crate) enum Source {
     Thread(u32),
     Shape(u32),
+    Body(u32),
 }
 
 /// One contact.
@@ -249,7 +250,7 @@ impl Island {
 fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
     let ContactSystem { entries, islands, active, root, .. } = coupling;
     root.clear();
-    root.extend((0..rods.len() as u32).map(|r| if shared { 0 } else { r }));
+    root.extend((0..rods.len().max(1) as u32).map(|r| if shared { 0 } else { r }));
     // In the order of slots, which need not be that of the arrays.
     let rod_of = |p: &Endpoint| rods.iter().position(|(blocks, _)| blocks.contains(&p.element)).unwrap_or(0);
     for entry in entries.iter_mut() {
@@ -268,9 +269,10 @@ fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize
     entries.sort_unstable_by_key(|e| match e.source {
         Source::Thread(k) => (e.island, 0, k),
         Source::Shape(k) => (e.island, 1, k),
+        Source::Body(k) => (e.island, 2, k),
     });
-    if islands.len() < rods.len() {
-        islands.resize_with(rods.len(), Island::default);
+    if islands.len() < root.len() {
+        islands.resize_with(root.len(), Island::default);
     }
     active.clear();
     let mut from = 0;
@@ -355,6 +357,7 @@ pub(crate) fn solve(state: &State, motion: &Motion, rods: &mut RodScratch, rows:
     entries.clear();
     thread::add_entries(state, motion, step, &mut rows.threads, entries);
     shape::add_entries(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
+    body::add_entries(state, &mut rows.bodies.rows, (&rows.movers, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
@@ -420,7 +423,7 @@ pub(crate) fn solve(state: &State, motion: &Motion, rods: &mut RodScratch, rows:
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
     load(entries, force, &mut rows.border, right);
-    hand_over(entries, force, &mut rows.threads, &mut rows.shapes);
+    hand_over(entries, force, &mut rows.threads, &mut rows.shapes, &mut rows.bodies.rows);
     respond(rods, system, constraint, &mut rows.border, right);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
@@ -517,7 +520,7 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
         for (z, r) in right.iter_mut().zip(more.iter()) {
             *z += *r;
         }
-        hand_over(entries, force, &mut rows.threads, &mut rows.shapes);
+        hand_over(entries, force, &mut rows.threads, &mut rows.shapes, &mut rows.bodies.rows);
     }
     rows.border.add_steps(steps);
     for (z, r) in step.iter_mut().zip(right.iter()) {
@@ -526,12 +529,19 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
 }
 
 /// Tells the rows their forces.
-fn hand_over(entries: &mut [Entry], force: &[f64], threads: &mut [thread::ThreadRow], shapes: &mut [shape::ShapeRow]) {
+fn hand_over(
+    entries: &mut [Entry],
+    force: &[f64],
+    threads: &mut [thread::ThreadRow],
+    shapes: &mut [shape::ShapeRow],
+    bodies: &mut [body::BodyRow],
+) {
     for (entry, f) in entries.iter_mut().zip(force.chunks_exact(3)) {
         entry.force = DVec3::from_slice(f);
         match entry.source {
             Source::Thread(k) => threads[k as usize].force = entry.force,
             Source::Shape(k) => shapes[k as usize].solved(entry.force),
+            Source::Body(k) => bodies[k as usize].force = entry.force,
         }
     }
 }

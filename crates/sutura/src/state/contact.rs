@@ -7,8 +7,10 @@ use glam::DVec3;
 pub(crate) enum Site {
     /// A place on an element, from 0 at its first particle to 1 at its second.
     Thread { element: u32, s: f64 },
-    /// A shape, by its slot.
+    /// A shape, by its slot, that a thread touches.
     Shape { shape: u32 },
+    /// A place on a shape that another one touches, in the frame of the shape.
+    Surface { shape: u32, at: DVec3 },
 }
 
 /// A contact at the last accepted state. Of two places on threads the one on the element of lower number comes first;
@@ -27,8 +29,8 @@ pub(crate) struct Contact {
     pub sliding: bool,
 }
 
-/// Those of threads with threads, sorted by elements and places, then those of threads with shapes, sorted by shape,
-/// element and place.
+/// Those of threads with threads, sorted by elements and places, those of threads with shapes, sorted by shape, element
+/// and place, and those of bodies.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Contacts(Vec<Contact>);
 
@@ -37,19 +39,28 @@ impl Site {
     pub fn thread(self) -> Option<(u32, f64)> {
         if let Site::Thread { element, s } = self { Some((element, s)) } else { None }
     }
-    /// Slot of a shape.
+    /// Slot of a shape that a thread touches.
     pub fn shape(self) -> Option<u32> {
         if let Site::Shape { shape } = self { Some(shape) } else { None }
+    }
+    /// Slot of a shape, whatever touches it.
+    pub fn any_shape(self) -> Option<u32> {
+        if let Site::Shape { shape } | Site::Surface { shape, .. } = self { Some(shape) } else { None }
     }
     /// What touches, without the place on it.
     pub fn piece(self) -> (u8, u32) {
         match self {
             Site::Thread { element, .. } => (0, element),
             Site::Shape { shape } => (1, shape),
+            Site::Surface { shape, .. } => (2, shape),
         }
     }
     fn place(self) -> f64 {
-        if let Site::Thread { s, .. } = self { s } else { 0.0 }
+        match self {
+            Site::Thread { s, .. } => s,
+            Site::Shape { .. } => 0.0,
+            Site::Surface { at, .. } => at.x + at.y + at.z,
+        }
     }
 }
 
@@ -99,11 +110,15 @@ impl Contacts {
     }
     /// Those of threads with threads.
     pub fn threads(&self) -> &[Contact] {
-        &self.0[..self.split()]
+        &self.0[..self.split(1)]
     }
     /// Those of threads with shapes.
     pub fn shapes(&self) -> &[Contact] {
-        &self.0[self.split()..]
+        &self.0[self.split(1)..self.split(2)]
+    }
+    /// Those of bodies with each other and with other shapes.
+    pub fn bodies(&self) -> &[Contact] {
+        &self.0[self.split(2)..]
     }
     pub fn retain(&mut self, keep: impl Fn(&Contact) -> bool) {
         self.0.retain(keep);
@@ -121,7 +136,7 @@ impl Contacts {
     pub fn copy_from(&mut self, other: &Self) {
         self.0.clone_from(&other.0);
     }
-    fn split(&self) -> usize {
-        self.0.partition_point(|c| c.b.shape().is_none())
+    fn split(&self, kind: u8) -> usize {
+        self.0.partition_point(|c| c.b.piece().0 < kind)
     }
 }

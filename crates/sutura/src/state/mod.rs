@@ -58,6 +58,7 @@ pub struct State {
     /// Where the user wants each driven shape at the end of the next step.
     pub(crate) shape_target: Vec<Pose>,
 
+    pub(crate) bodies: Slots<BodyState>,
     pub(crate) grips: Slots<GripState>,
     pub(crate) loads: Slots<LoadState>,
     pub(crate) reels: Slots<ReelState>,
@@ -87,6 +88,20 @@ impl Saved {
     pub fn restore(&self, depth: u32, state: &mut State) {
         state.copy_from(self.at(depth));
     }
+}
+
+/// A free body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct BodyState {
+    /// Center of mass \[m\], and `world_from_principal`.
+    pub position: DVec3,
+    pub orientation: DQuat,
+    /// Velocity of the center of mass \[m/s\], and angular momentum about it in world axes \[N m s\].
+    pub velocity: DVec3,
+    pub angular_momentum: DVec3,
+    /// Rates of the two, where the integrator needs them and `history` says that they are known; else zero.
+    pub acceleration: DVec3,
+    pub torque: DVec3,
 }
 
 /// A grip in action.
@@ -158,6 +173,7 @@ impl State {
             weld_orientation,
             shape_pose,
             shape_target,
+            bodies,
             grips,
             loads,
             reels,
@@ -180,6 +196,7 @@ impl State {
         self.weld_orientation.clone_from(weld_orientation);
         self.shape_pose.clone_from(shape_pose);
         self.shape_target.clone_from(shape_target);
+        self.bodies.copy_from(bodies);
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
         self.reels.copy_from(reels);

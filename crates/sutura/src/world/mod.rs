@@ -1,5 +1,6 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
+mod bodies;
 mod holds;
 mod rods;
 mod saved;
@@ -43,6 +44,7 @@ pub struct Wrench {
 
 const ROD: Error = Error::StaleHandle { what: "rod" };
 const SHAPE: Error = Error::StaleHandle { what: "shape" };
+const BODY: Error = Error::StaleHandle { what: "body" };
 const GRIP: Error = Error::StaleHandle { what: "grip" };
 const LOAD: Error = Error::StaleHandle { what: "load" };
 const REEL: Error = Error::StaleHandle { what: "reel" };

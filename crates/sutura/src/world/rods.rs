@@ -169,7 +169,7 @@ impl World {
         state.contacts.retain(|c| c.all_elements().all(|e| !range.contains(&(e as usize))));
         state.contacts.rename(|site| match site {
             Site::Thread { element, s } => Site::Thread { element: shift(element), s },
-            Site::Shape { .. } => site,
+            Site::Shape { .. } | Site::Surface { .. } => site,
         });
         state.grips.retain(|g| g.rod != rod.index);
         state.loads.retain(|l| l.rod != rod.index);

@@ -93,6 +93,16 @@ impl World {
         if !finite {
             return Err("a number in it is not finite or a quaternion is not of unit length");
         }
+        let slots = |bodies: &mut dyn Iterator<Item = u32>| bodies.collect::<Vec<_>>();
+        if slots(&mut s.bodies.iter().map(|(k, _)| k)) != slots(&mut self.model.bodies.iter().map(|(k, _)| k)) {
+            return Err("it is of a world with other bodies");
+        }
+        for (_, b) in s.bodies.iter() {
+            let vectors = [b.position, b.velocity, b.angular_momentum, b.acceleration, b.torque];
+            if !vectors.iter().all(|v| v.is_finite()) || !b.orientation.is_normalized() {
+                return Err("a body is out of range");
+            }
+        }
         for (_, g) in s.grips.iter() {
             let rod = self.model.rods.at(g.rod).ok_or("a grip holds a thread that is not here")?;
             let last = if g.hold == Hold::Jaw { rod.n_elements - 1 } else { rod.n_elements };
@@ -118,6 +128,7 @@ impl World {
         let site = |site: Site| match site {
             Site::Thread { element: e, s } => element(e) && place(s),
             Site::Shape { shape } => self.model.shapes.at(shape).is_some(),
+            Site::Surface { shape, at } => self.model.shapes.at(shape).is_some() && at.is_finite(),
         };
         let contacts = s.contacts.iter().all(|c| {
             site(c.a)

@@ -12,25 +12,31 @@ use crate::view::ShapeView;
 impl World {
     /// Adds a shape.
     pub fn insert_shape(&mut self, spec: &ShapeSpec) -> Result<Handle<Shape>, Error> {
-        let Checked { geometry, closed, container, notes } = spec.check()?;
+        if spec.motion == ShapeMotion::OnBody {
+            return Err(on_body(spec.motion));
+        }
+        let pose = Pose::new(spec.pose.position, spec.pose.orientation.normalize());
+        self.place_shape(spec.check()?, spec.surface, spec.motion, None, pose)
+    }
+
+    /// Puts a checked shape into the world.
+    pub(super) fn place_shape(
+        &mut self,
+        checked: Checked,
+        surface: u32,
+        motion: ShapeMotion,
+        body: Option<u32>,
+        pose: Pose,
+    ) -> Result<Handle<Shape>, Error> {
+        let Checked { geometry, closed, container, notes } = checked;
         let collider = crate::model::collider::Collider::new(&geometry)?;
         let hash = crate::snapshot::hash_of(&geometry);
-        let shape = ShapeModel {
-            geometry,
-            hash,
-            collider,
-            surface: spec.surface,
-            motion: spec.motion,
-            closed,
-            container,
-            notes,
-        };
+        let shape = ShapeModel { geometry, hash, collider, surface, motion, body, closed, container, notes };
         let handle: Handle<Shape> = self.model.shapes.insert(shape);
         self.model.placed.shapes.push(handle.index);
         let n = self.model.shapes.len();
         self.state.shape_pose.resize(n, Pose::IDENTITY);
         self.state.shape_target.resize(n, Pose::IDENTITY);
-        let pose = Pose::new(spec.pose.position, spec.pose.orientation.normalize());
         self.state.shape_pose[handle.index()] = pose;
         self.state.shape_target[handle.index()] = pose;
         Ok(handle)
@@ -38,9 +44,14 @@ impl World {
 
     /// Removes a shape.
     pub fn remove_shape(&mut self, shape: Handle<Shape>) -> Result<(), Error> {
-        self.model.shapes.remove(shape).ok_or(SHAPE)?;
+        let motion = self.model.shapes.get(shape).ok_or(SHAPE)?.motion;
+        if motion == ShapeMotion::OnBody {
+            return Err(on_body(motion));
+        }
+        self.model.shapes.remove(shape);
         self.state.invalidate(History::Unknown);
-        self.state.contacts.retain(|c| c.b.shape() != Some(shape.index));
+        let gone = Some(shape.index);
+        self.state.contacts.retain(|c| c.a.any_shape() != gone && c.b.any_shape() != gone);
         Ok(())
     }
 
@@ -60,7 +71,11 @@ impl World {
     /// Changes what moves a shape (for instance the force on a pushed one), from the next step on.
     pub fn set_shape_motion(&mut self, shape: Handle<Shape>, motion: ShapeMotion) -> Result<(), Error> {
         motion.validate()?;
-        self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion = motion;
+        let now = &mut self.model.shapes.get_mut(shape).ok_or(SHAPE)?.motion;
+        if *now == ShapeMotion::OnBody || motion == ShapeMotion::OnBody {
+            return Err(on_body(motion));
+        }
+        *now = motion;
         self.state.invalidate(History::Unknown);
         self.state.shape_target[shape.index()] = self.state.shape_pose[shape.index()];
         Ok(())
@@ -105,4 +120,14 @@ impl World {
     pub fn shape_is_closed(&self, shape: Handle<Shape>) -> Result<bool, Error> {
         Ok(self.model.shapes.get(shape).ok_or(SHAPE)?.closed)
     }
+}
+
+/// A shape of a body goes and moves with it.
+fn on_body(motion: ShapeMotion) -> Error {
+    Error::invalid(
+        "shape",
+        "motion",
+        motion,
+        "a shape of its own, where that of a body is made and moved with the body",
+    )
 }

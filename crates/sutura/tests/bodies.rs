@@ -1,0 +1,221 @@
+//! Free rigid bodies against closed forms (`docs/theory.md` 18).
+
+use sutura::glam::{DQuat, DVec3};
+use sutura::{
+    Body, BodySpec, Friction, Geometry, Handle, Material, Pose, RodSpec, Settings, ShapeSpec, StepReport, World,
+};
+
+const DT: f64 = 1.0 / 60.0;
+const G: f64 = 9.81;
+/// Kilograms per cubic meter of all bodies here.
+const DENSITY: f64 = 1000.0;
+
+fn world(gravity: DVec3, mu: f64) -> World {
+    World::new(Settings { gravity, friction: Friction { stick: mu, slide: mu }, ..Settings::default() }).unwrap()
+}
+
+fn run(world: &mut World, seconds: f64, mut watch: impl FnMut(&World, &StepReport)) {
+    for _ in 0..(seconds / DT).round() as u32 {
+        let report = world.step(DT);
+        assert!(report.incidents.is_empty(), "{:?}", report.incidents);
+        watch(world, &report);
+    }
+}
+
+fn ground(world: &mut World, turn: DQuat) {
+    world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::new(DVec3::ZERO, turn))).unwrap();
+}
+
+#[test]
+fn a_body_falls_as_implicit_euler_has_it() {
+    let mut world = world(DVec3::Z * -G, 0.3);
+    let ball = BodySpec::solid(Geometry::Sphere { radius: 0.01 }, DENSITY, Pose::IDENTITY);
+    let body = world.insert_body(&BodySpec { velocity: DVec3::X, ..ball }).unwrap();
+    run(&mut world, 0.5, |_, _| {});
+    let (h, n) = (1.0 / 240.0, 120.0);
+    let wanted = DVec3::new(0.5, 0.0, -G * h * h * n * (n + 1.0) / 2.0);
+    let at = world.body(body).unwrap().pose().position;
+    assert!((at - wanted).length() < 1e-12, "{at} {wanted}");
+}
+
+/// Moments 1:2:3 and the angular velocity after a second, from elliptic functions.
+#[test]
+fn a_free_top_turns_as_euler_says_and_keeps_its_momentum() {
+    let plate = Geometry::Box { half_sides: DVec3::new(2f64.sqrt(), 1.0, 1e-3) * 0.01 };
+    for (turn, bound) in [(DQuat::IDENTITY, 1e-3), (DQuat::from_rotation_x(1.1) * DQuat::from_rotation_z(0.4), 1e-3)] {
+        let mut world = world(DVec3::ZERO, 0.3);
+        let spec = BodySpec::solid(plate.clone(), DENSITY, Pose::new(DVec3::X, turn));
+        let spin = turn * DVec3::new(3.0, 4.0, 5.0);
+        let body = world.insert_body(&BodySpec { angular_velocity: spin, ..spec }).unwrap();
+        let before = world.body(body).unwrap().angular_momentum();
+        run(&mut world, 1.0, |_, _| {});
+        let view = world.body(body).unwrap();
+        assert!((view.angular_momentum() - before).length() < 1e-12 * before.length());
+        let found = view.pose().orientation.conjugate() * view.angular_velocity();
+        let wanted = DVec3::new(4.734_230_16, -1.608_435_52, 5.428_717_93);
+        assert!((found - wanted).length() < bound * wanted.length(), "{found}");
+    }
+}
+
+/// Starts a solid on a slope and gives its acceleration down the slope over g sin a.
+fn rolling(geometry: Geometry, radius: f64, orientation: DQuat) -> f64 {
+    let angle: f64 = 0.2;
+    let turn = DQuat::from_rotation_y(angle);
+    let mut world = world(DVec3::Z * -G, 0.5);
+    ground(&mut world, turn);
+    let out = turn * DVec3::Z;
+    let spec = BodySpec::solid(geometry, DENSITY, Pose::new(out * radius, turn * orientation));
+    let body = world.insert_body(&spec).unwrap();
+    let time = 1.0;
+    run(&mut world, time, |_, _| {});
+    let view = world.body(body).unwrap();
+    let off = view.center().dot(out) - radius;
+    assert!(off.abs() < 1e-4 * radius, "off the slope by {off:e}");
+    view.velocity().dot(turn * DVec3::X) / (G * angle.sin() * time)
+}
+
+#[test]
+fn what_is_round_rolls_down_a_slope() {
+    let sphere = rolling(Geometry::Sphere { radius: 0.01 }, 0.01, DQuat::IDENTITY);
+    assert!((sphere / (5.0 / 7.0) - 1.0).abs() < 5e-3, "sphere {sphere}");
+    let upright = DQuat::from_rotation_x(core::f64::consts::FRAC_PI_2);
+    let cylinder = rolling(Geometry::Cylinder { radius: 0.01, half_length: 0.02 }, 0.01, upright);
+    assert!((cylinder / (2.0 / 3.0) - 1.0).abs() < 5e-3, "cylinder {cylinder}");
+}
+
+#[test]
+fn a_sliding_ball_comes_to_roll_at_five_sevenths_of_its_speed() {
+    let (mu, speed) = (0.2, 1.0);
+    let mut world = world(DVec3::Z * -G, mu);
+    ground(&mut world, DQuat::IDENTITY);
+    let ball = BodySpec::solid(Geometry::Sphere { radius: 0.01 }, DENSITY, Pose::at(DVec3::Z * 0.01));
+    let body = world.insert_body(&BodySpec { velocity: DVec3::X * speed, ..ball }).unwrap();
+    let wanted = 2.0 / 7.0 * speed / (mu * G);
+    run(&mut world, 0.5 * wanted, |_, _| {});
+    let half = world.body(body).unwrap().velocity().x;
+    let t = world.time();
+    assert!((half - (speed - mu * G * t)).abs() < 5e-3 * speed, "{half} after {t}");
+    run(&mut world, wanted, |_, _| {});
+    let view = world.body(body).unwrap();
+    assert!((view.velocity().x / (5.0 / 7.0 * speed) - 1.0).abs() < 5e-3, "{}", view.velocity());
+    assert!((view.angular_velocity().y * 0.01 - view.velocity().x).abs() < 1e-3 * speed, "{}", view.angular_velocity());
+}
+
+#[test]
+fn a_box_holds_on_a_slope_up_to_its_friction_and_slides_beyond() {
+    let mu: f64 = 0.3;
+    for (part, slides) in [(0.97, false), (1.1, true)] {
+        let angle = (part * mu).atan();
+        let turn = DQuat::from_rotation_y(angle);
+        let mut world = world(DVec3::Z * -G, mu);
+        ground(&mut world, turn);
+        let half = DVec3::new(0.02, 0.02, 0.01);
+        let spec =
+            BodySpec::solid(Geometry::Box { half_sides: half }, DENSITY, Pose::new(turn * DVec3::Z * 0.01, turn));
+        let body = world.insert_body(&spec).unwrap();
+        run(&mut world, 2.0, |_, _| {});
+        let view = world.body(body).unwrap();
+        let way = (view.center() - turn * DVec3::Z * 0.01).dot(turn * DVec3::X);
+        if slides {
+            let t = world.time();
+            let wanted = 0.5 * G * (angle.sin() - mu * angle.cos()) * t * t;
+            assert!((way / wanted - 1.0).abs() < 0.01, "{way} {wanted}");
+        } else {
+            assert!(way.abs() < 1e-6, "slid by {way:e}");
+            assert!(world.body_wrench(body).unwrap().force.dot(DVec3::Z) > 0.99 * G * view.mass().mass);
+        }
+    }
+}
+
+fn stack(world: &mut World, count: u32) -> Vec<Handle<Body>> {
+    let half = 0.01;
+    (0..count)
+        .map(|k| {
+            let at = DVec3::new(0.002 * f64::from(k % 2), 0.0, half * (2.0 * f64::from(k) + 1.0));
+            let cube = Geometry::Box { half_sides: DVec3::splat(half) };
+            world.insert_body(&BodySpec::solid(cube, DENSITY, Pose::at(at))).unwrap()
+        })
+        .collect()
+}
+
+#[test]
+fn a_stack_of_boxes_stands() {
+    let mut world = world(DVec3::Z * -G, 0.5);
+    ground(&mut world, DQuat::IDENTITY);
+    let boxes = stack(&mut world, 5);
+    let before: Vec<DVec3> = boxes.iter().map(|b| world.body(*b).unwrap().center()).collect();
+    run(&mut world, 5.0, |_, _| {});
+    for (b, was) in boxes.iter().zip(before) {
+        let view = world.body(*b).unwrap();
+        assert!((view.center() - was).length() < 1e-5, "{} {was}", view.center());
+        assert!(view.velocity().length() < 1e-6, "{}", view.velocity());
+    }
+}
+
+/// A thread that hits a ball: what one gains the other loses.
+#[test]
+fn a_thread_and_a_body_that_meet_keep_their_momentum() {
+    let mut world = world(DVec3::ZERO, 0.3);
+    let spec = RodSpec::straight(
+        DVec3::new(-0.03, 0.0, 0.0),
+        DVec3::new(0.03, 0.0, 0.0),
+        40,
+        3e-4,
+        Material::elastic(1e8, 1150.0),
+    );
+    let rod = world.insert_rod(&spec).unwrap();
+    let ball = Geometry::Sphere { radius: 2e-3 };
+    let spec = BodySpec::solid(ball, DENSITY, Pose::at(DVec3::new(0.004, 0.0, 4e-3)));
+    let body = world.insert_body(&BodySpec { velocity: DVec3::new(0.05, 0.0, -0.3), ..spec }).unwrap();
+    let sum = |world: &World| world.rod(rod).unwrap().momentum() + world.body(body).unwrap().momentum();
+    let before = sum(&world);
+    let start = world.body(body).unwrap().momentum();
+    run(&mut world, 0.2, |world, _| {
+        let off = (sum(world) - before).length();
+        assert!(off < 1e-6 * before.length(), "{off:e} at {}", world.time());
+    });
+    let handed = (world.body(body).unwrap().momentum() - start).length();
+    assert!(handed > 0.1 * start.length(), "they met: {handed:e} of {:e}", start.length());
+}
+
+#[test]
+fn a_snapshot_holds_bodies_and_dropped_memory_changes_no_bit() {
+    let build = || {
+        let mut world = world(DVec3::Z * -G, 0.5);
+        ground(&mut world, DQuat::IDENTITY);
+        stack(&mut world, 3);
+        let spec = BodySpec::solid(Geometry::Sphere { radius: 0.005 }, DENSITY, Pose::at(DVec3::new(0.0, 0.0, 0.1)));
+        world.insert_body(&BodySpec { angular_velocity: DVec3::new(1.0, 2.0, 3.0), ..spec }).unwrap();
+        world
+    };
+    let (mut one, mut other) = (build(), build());
+    for _ in 0..20 {
+        one.step(DT);
+        other.step(DT);
+        other.forget_scratch();
+    }
+    assert_eq!(one.state_hash(), other.state_hash());
+    let mut third = build();
+    third.restore(&one.snapshot()).unwrap();
+    assert_eq!(third.state_hash(), one.state_hash());
+    for _ in 0..20 {
+        one.step(DT);
+        third.step(DT);
+    }
+    assert_eq!(third.state_hash(), one.state_hash());
+}
+
+#[test]
+fn a_removed_body_is_gone_with_its_shapes() {
+    let mut world = world(DVec3::Z * -G, 0.5);
+    ground(&mut world, DQuat::IDENTITY);
+    let boxes = stack(&mut world, 2);
+    run(&mut world, 0.2, |_, _| {});
+    assert_eq!(world.view().shapes().count(), 3);
+    world.remove_body(boxes[0]).unwrap();
+    assert_eq!(world.view().shapes().count(), 1 + 1);
+    assert!(world.body(boxes[0]).is_err());
+    run(&mut world, 0.5, |_, _| {});
+    let z = world.body(boxes[1]).unwrap().center().z;
+    assert!((z - 0.01).abs() < 1e-4, "{z}");
+}

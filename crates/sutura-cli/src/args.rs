@@ -469,6 +469,7 @@ Examples:
   sutura run overhand --record && sutura replay out/overhand/input.sutura
   sutura replay here.sutura --with there.sutura       compare two recordings, run nothing
   sutura replay input.sutura --list                   say what was done, run nothing
+  sutura replay input.sutura --hashes | tail -n 1     the recorded hash of the last state
   sutura replay input.sutura --until 0.5 --state here.csv
                                                       the numbers of the state at half a second
 
@@ -477,7 +478,7 @@ pub struct Replay {
     /// Recorded input
     pub file: PathBuf,
     /// Compare with this recording instead of running: inputs and states
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "state", "list"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["until", "state", "list", "hashes"])]
     pub with: Option<PathBuf>,
     /// Stop at this simulated time [s]
     #[arg(long, value_name = "TIME", value_parser = time)]
@@ -486,8 +487,11 @@ pub struct Replay {
     #[arg(long, value_name = "FILE")]
     pub state: Option<PathBuf>,
     /// List what was done, run nothing
-    #[arg(long, conflicts_with_all = ["until", "state"])]
+    #[arg(long, conflicts_with_all = ["until", "state", "hashes"])]
     pub list: bool,
+    /// Print the recorded hash of the state after each step, one a line, run nothing
+    #[arg(long, conflicts_with_all = ["until", "state"])]
+    pub hashes: bool,
     /// Print nothing when all is the same
     #[arg(long, short)]
     pub quiet: bool,

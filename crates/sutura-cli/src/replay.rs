@@ -17,6 +17,14 @@ pub fn replay(args: &Replay) -> anyhow::Result<bool> {
         say(&lines.join("\n"))?;
         return Ok(true);
     }
+    if args.hashes {
+        let hash = |i: &Input| if let Input::Step(_, hash) = i { Some(format!("{hash:016x}\n")) } else { None };
+        let lines: String = recording.inputs.iter().filter_map(hash).collect();
+        if !lines.is_empty() {
+            say(&lines)?;
+        }
+        return Ok(true);
+    }
     if let Some(other) = &args.with {
         return compare(&recording, &read(other)?, args.quiet);
     }

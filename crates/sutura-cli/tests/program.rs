@@ -604,6 +604,12 @@ fn a_recorded_run_replays_to_the_same_state_after_every_step() {
         "{list}"
     );
 
+    let (code, hashes) = said(&[&same, "--hashes"]);
+    let recorded: Vec<&str> =
+        list.lines().filter_map(|l| l.strip_suffix(')')?.split_once("s, state ")).map(|l| l.1).collect();
+    assert_eq!((code, hashes.lines().collect()), (Some(0), recorded));
+    assert_eq!(hashes.lines().last(), Some(hash.as_str()));
+
     std::fs::write(&path, &bytes[..last]).expect("a temporary folder can be written");
     assert_eq!(said(&[&one]).0, Some(2));
     assert_eq!(said(&["swing.toml"]).0, Some(2));

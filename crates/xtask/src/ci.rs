@@ -2,7 +2,8 @@
 
 use crate::fuzz;
 use crate::imports;
-use crate::program::{self, GlbValidator, Profile};
+use crate::program::{self, GlbValidator, Profile, Program};
+use crate::states;
 use crate::tally::{Tally, cargo, root};
 use crate::viewer;
 use std::path::PathBuf;
@@ -52,14 +53,23 @@ pub fn tests(tally: &mut Tally, args: &[String]) {
 
 /// What a scene that ran left behind.
 pub struct Recorded {
-    name: String,
-    input: PathBuf,
+    pub name: String,
+    /// What was done to the world, with the state hash after every step.
+    pub input: PathBuf,
     trajectory: PathBuf,
 }
 
-/// Runs scenes with the release build: the named ones, or all but those left out. Those that ran.
+/// Runs scenes with the release build: the named ones, or all but those left out. Compares their states with those that
+/// are kept. Those that ran.
 pub fn scenes(tally: &mut Tally, names: &[String]) -> Vec<Recorded> {
     let Some(sutura) = program::build(tally, Profile::Release) else { return Vec::new() };
+    let recorded = record(tally, &sutura, names);
+    states::check(tally, &sutura, &recorded);
+    recorded
+}
+
+/// Runs the named scenes, or all but those left out. Those that passed.
+pub fn record(tally: &mut Tally, sutura: &Program, names: &[String]) -> Vec<Recorded> {
     let all = match sample_names() {
         Ok(all) => all,
         Err(why) => {
@@ -140,7 +150,7 @@ fn same_bits(tally: &mut Tally, recorded: &[Recorded]) {
 }
 
 /// Names of the sample scenes, sorted.
-fn sample_names() -> Result<Vec<String>, String> {
+pub fn sample_names() -> Result<Vec<String>, String> {
     let folder = root().join("scenes");
     let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let mut names: Vec<String> = entries

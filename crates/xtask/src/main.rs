@@ -6,6 +6,7 @@ mod fuzz;
 mod imports;
 mod program;
 mod release;
+mod states;
 mod tally;
 mod viewer;
 
@@ -15,13 +16,15 @@ use tally::Tally;
 const HELP: &str = "\
 cargo xtask ci               the whole check: format, lints, tests, documentation, sample scenes and their GLB files, same bits in every build
 cargo xtask test [ARGS]      all tests (`cargo test --workspace`), with a count at the end
-cargo xtask scenes [NAMES]   run sample scenes with the release build and validate them as GLB; all of them without names
+cargo xtask scenes [NAMES]   run sample scenes with the release build, all of them without names: their states are those that
+                             are kept, and they are valid GLB
 cargo xtask bench [ARGS]     `sutura bench` with the release build
 cargo xtask fuzz [TARGET] [--minutes M]
                              fuzz one target or all, each for so long (10)
 cargo xtask imports [--list] do modules of the engine import each other in a circle? --list prints every import
 cargo xtask viewer           the part of the whole check that is about the plugin for Bevy and the viewer
-cargo xtask bless            run the square knot and take its last picture for the README
+cargo xtask bless [picture]  run the square knot and take its last picture for the README
+cargo xtask bless states     run all sample scenes and keep their states, where these are meant to change
 cargo xtask release          is this commit ready to be released? (changes nothing)";
 
 fn main() -> ExitCode {
@@ -30,7 +33,7 @@ fn main() -> ExitCode {
         println!("{HELP}");
         return ExitCode::SUCCESS;
     };
-    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench" | "fuzz" | "imports");
+    let takes_arguments = matches!(command.as_str(), "test" | "scenes" | "bench" | "fuzz" | "imports" | "bless");
     let mut tally = Tally::default();
     match command.as_str() {
         _ if !takes_arguments && !rest.is_empty() => return usage(&format!("`{command}` takes no arguments")),
@@ -52,7 +55,12 @@ fn main() -> ExitCode {
             }
         }
         "viewer" => viewer::check(&mut tally),
-        "bless" => program::bless(&mut tally),
+        "bless" => match rest.first().map(String::as_str) {
+            _ if rest.len() > 1 => return usage("`bless` takes one argument"),
+            None | Some("picture") => program::bless_picture(&mut tally),
+            Some("states") => states::bless(&mut tally),
+            Some(what) => return usage(&format!("`bless` takes `picture` or `states`, not `{what}`")),
+        },
         "release" => release::ready(&mut tally),
         "help" | "--help" | "-h" => {
             println!("{HELP}");

@@ -76,6 +76,16 @@ impl Program {
         status_within(self.command().args(["replay", "--quiet"]).arg(input), limit)
     }
 
+    /// The state hash after every step of a recorded input.
+    pub fn hashes(&self, input: &Path) -> Result<Vec<u64>, String> {
+        let output = self.command().args(["replay", "--hashes"]).arg(input).output().map_err(|e| e.to_string())?;
+        if !output.status.success() {
+            return Err(format!("{}: {}", output.status, String::from_utf8_lossy(&output.stderr)));
+        }
+        let hash = |line: &str| u64::from_str_radix(line, 16).map_err(|e| format!("`{line}` is no hash: {e}"));
+        String::from_utf8_lossy(&output.stdout).lines().map(hash).collect()
+    }
+
     /// Exports a recorded trajectory as GLB beside it.
     pub fn export_glb(&self, trajectory: &Path) -> Result<PathBuf, String> {
         let glb = trajectory.with_extension("glb");
@@ -180,7 +190,7 @@ pub fn bench(tally: &mut Tally, args: &[String]) {
 }
 
 /// Runs the main job and takes its last near picture for the README.
-pub fn bless(tally: &mut Tally) {
+pub fn bless_picture(tally: &mut Tally) {
     let Some(sutura) = build(tally, Profile::Release) else { return };
     let out = target().join("scenes/square_knot-picture");
     let mut run = sutura.command();

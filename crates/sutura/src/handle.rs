@@ -83,13 +83,6 @@ impl<T> Slots<T> {
     {
         self.slots.clone_from(&from.slots);
     }
-    /// Fills a slot, and makes room for it.
-    pub(crate) fn put(&mut self, index: u32, value: T) {
-        while self.slots.len() <= index as usize {
-            self.slots.push((0, None));
-        }
-        self.slots[index as usize].1 = Some(value);
-    }
     /// Empties a slot.
     pub(crate) fn empty(&mut self, index: u32) {
         self.slots[index as usize].1 = None;

@@ -13,7 +13,6 @@
 //! L-stable, and needs nothing of the substep before but accelerations. Where those are not known the method of
 //! Alexander (1977) takes a substep, with the same stability function. Theory 3.1.
 
-use crate::handle::Slots;
 use crate::math::{exp, log};
 use crate::model::Model;
 use crate::motion::{BodyStart, Motion};
@@ -178,7 +177,8 @@ pub(crate) fn carry(
 
 /// Sets up what bodies start from, and moves them to where they would come without contact.
 fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &State, stage: &Stage, h: f64) {
-    motion.bodies = Slots::default();
+    motion.bodies.clear();
+    motion.bodies.resize(model.bodies.len(), None);
     for slot in 0..model.bodies.len() as u32 {
         let (Some(body), Some(now), Some(was)) = (model.bodies.at(slot), state.bodies.at(slot), origin.bodies.at(slot))
         else {
@@ -216,15 +216,18 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
         let now = state.bodies.at_mut(slot).expect("living");
         (now.position, now.orientation) = (start.target + fall, orientation);
         place_shapes(model, state, slot);
-        motion.bodies.put(slot, start);
+        motion.bodies[slot as usize] = Some(start);
     }
 }
 
 /// Velocities and angular momenta of bodies from their motion.
 fn leave_rates_of_bodies(model: &Model, state: &mut State, motion: &Motion, stage: &Stage, h: f64) {
     let over = 1.0 / (stage.span * stage.span);
-    for (slot, start) in motion.bodies.iter() {
-        let (Some(body), Some(now)) = (model.bodies.at(slot), state.bodies.at_mut(slot)) else { continue };
+    for (slot, start) in motion.bodies.iter().enumerate() {
+        let slot = slot as u32;
+        let (Some(body), Some(now), Some(start)) = (model.bodies.at(slot), state.bodies.at_mut(slot), start) else {
+            continue;
+        };
         let reached = momentum(body.mass.moments, start.base, now, stage.span);
         now.acceleration = (now.position - start.target) * (over * motion.heavier[0]);
         now.torque = (reached - start.momentum) * (motion.heavier[1] / stage.span);

@@ -1,6 +1,5 @@
 //! What a solve starts from: where things were, where their velocities carry them, and what acts on them from outside.
 
-use crate::handle::Slots;
 use crate::math::Pose;
 use crate::model::Model;
 use glam::{DQuat, DVec3};
@@ -25,7 +24,7 @@ pub(crate) struct Motion {
     pub heavier: [f64; 2],
 
     /// Of bodies, by their slots.
-    pub bodies: Slots<BodyStart>,
+    pub bodies: Vec<Option<BodyStart>>,
     /// Time by which accelerations act on velocities in the solve \[s\].
     pub span: f64,
 

@@ -6,6 +6,7 @@ mod tree;
 
 use crate::lanes::Vec2;
 use crate::model::Model;
+use crate::model::body::BodyModel;
 use crate::model::collider::{Collider, Distance};
 use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
@@ -195,7 +196,8 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
     let living = || model.shapes.iter().zip(&*shape_bounds);
     for (k, ((a, first), (lo, hi))) in living().enumerate() {
         for ((b, second), (other_lo, other_hi)) in living().skip(k + 1) {
-            let size = [a, b].iter().filter_map(|s| model.body_of(*s)).map(|b| b.size()).fold(f64::INFINITY, f64::min);
+            let size =
+                [a, b].iter().filter_map(|s| model.body_of(*s)).map(BodyModel::size).fold(f64::INFINITY, f64::min);
             let room = DVec3::splat(params::MARGIN * size);
             let near = size.is_finite() && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
             if near && first.body != second.body {

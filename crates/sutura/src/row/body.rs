@@ -7,6 +7,7 @@
 use crate::collide::Candidates;
 use crate::math::{Pose, log};
 use crate::model::Model;
+use crate::model::body::BodyModel;
 use crate::model::collider::{Manifolds, Touch, touches};
 use crate::motion::Motion;
 use crate::params;
@@ -178,7 +179,7 @@ fn a_way(from: &Pose, to: &Pose, collider: &crate::model::collider::Collider) ->
 
 /// Length of the body of a shape: its radius of gyration.
 fn size_of(model: &Model, shape: u32) -> f64 {
-    model.body_of(shape).map_or(f64::INFINITY, |b| b.size())
+    model.body_of(shape).map_or(f64::INFINITY, BodyModel::size)
 }
 
 fn axes(n: DVec3) -> [DVec3; 3] {

@@ -129,7 +129,7 @@ impl Movers {
         let span = motion.span;
         for (number, (slot, center)) in self.bodies.iter_mut().enumerate() {
             let first = self.sliders.len() + SIX * number;
-            let (Some(body), Some(start)) = (state.bodies.at(*slot), motion.bodies.at(*slot)) else { continue };
+            let (Some(body), Some(start)) = (state.bodies.at(*slot), motion.bodies[*slot as usize]) else { continue };
             let mass = &model.bodies.at(*slot).expect("listed").mass;
             *center = body.position;
             let w = mass.mass * motion.heavier[0] / (span * span);

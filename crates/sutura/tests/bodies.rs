@@ -1,8 +1,9 @@
-//! Free rigid bodies against closed forms (`docs/theory.md` 18).
+//! Free rigid bodies against closed forms (`docs/theory.md` 19).
 
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Body, BodySpec, Friction, Geometry, Handle, Material, Pose, RodSpec, Settings, ShapeSpec, StepReport, World,
+    Body, BodySpec, ColliderSpec, Friction, Geometry, GripSpec, Handle, Hold, Material, Place, Pose, RodSpec, Settings,
+    ShapeSpec, StepReport, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -218,4 +219,73 @@ fn a_removed_body_is_gone_with_its_shapes() {
     run(&mut world, 0.5, |_, _| {});
     let z = world.body(boxes[1]).unwrap().center().z;
     assert!((z - 0.01).abs() < 1e-4, "{z}");
+}
+
+#[test]
+fn a_ball_that_is_shot_at_a_thin_plate_stays_on_its_side() {
+    for speed in [0.1, 1.0, 10.0, 50.0] {
+        let mut world = world(DVec3::ZERO, 0.3);
+        let plate = Geometry::Box { half_sides: DVec3::new(0.05, 0.05, 1e-4) };
+        world.insert_shape(&ShapeSpec::fixed(plate, Pose::IDENTITY)).unwrap();
+        let ball = BodySpec::solid(Geometry::Sphere { radius: 2e-3 }, DENSITY, Pose::at(DVec3::Z * 0.05));
+        let body = world.insert_body(&BodySpec { velocity: DVec3::Z * -speed, ..ball }).unwrap();
+        run(&mut world, 0.6, |_, _| {});
+        let z = world.body(body).unwrap().center().z;
+        assert!(z > 2.0e-3, "{z} at {speed} m/s");
+    }
+}
+
+/// Without restitution the tangential velocity loses what friction may take, at most what makes the ball roll.
+#[test]
+fn an_oblique_impact_takes_what_friction_may() {
+    for mu in [0.1, 0.5] {
+        let mut world = world(DVec3::ZERO, mu);
+        ground(&mut world, DQuat::IDENTITY);
+        let ball = BodySpec::solid(Geometry::Sphere { radius: 0.01 }, DENSITY, Pose::at(DVec3::Z * 0.03));
+        let body = world.insert_body(&BodySpec { velocity: DVec3::new(1.0, 0.0, -1.0), ..ball }).unwrap();
+        run(&mut world, 0.2, |_, _| {});
+        let v = world.body(body).unwrap().velocity();
+        let wanted = 1.0 - f64::min(mu, 2.0 / 7.0);
+        // The compliance of a contact gives back a thousandth.
+        assert!((v.x / wanted - 1.0).abs() < 5e-3 && v.z.abs() < 2e-3, "{v} {wanted}");
+    }
+}
+
+/// Hooks on a thread between two pins: the thread bears their weight, and the pins bear it all.
+#[test]
+fn a_thread_bears_the_bodies_that_hang_on_it() {
+    let mut world = world(DVec3::Z * -G, 0.3);
+    let (from, to) = (DVec3::X * -0.05, DVec3::X * 0.05);
+    let rod = world.insert_rod(&RodSpec::straight(from, to, 100, 3e-4, Material::elastic(1e9, 1150.0))).unwrap();
+    let pins = [Place::Start, Place::End].map(|p| world.insert_grip(&GripSpec::at_once(rod, p, Hold::Pin)).unwrap());
+    let part = |at: DVec3, half_sides: DVec3| ColliderSpec {
+        geometry: Geometry::Box { half_sides },
+        pose: Pose::at(at),
+        density: DENSITY,
+        surface: 0,
+    };
+    let hooks: Vec<_> = [-0.02, 0.015]
+        .map(|x| {
+            let leg = DVec3::new(1e-3, 5e-4, 3e-3);
+            let colliders = vec![
+                part(DVec3::ZERO, DVec3::new(1e-3, 3e-3, 1e-3)),
+                part(DVec3::new(0.0, 2.5e-3, -4e-3), leg),
+                part(DVec3::new(0.0, -2.5e-3, -4e-3), leg),
+            ];
+            let body = BodySpec::solid(Geometry::Sphere { radius: 1.0 }, 0.0, Pose::at(DVec3::new(x, 0.0, 1.4e-3)));
+            world.insert_body(&BodySpec { colliders, ..body }).unwrap()
+        })
+        .into();
+    run(&mut world, 2.0, |_, _| {});
+    let mut weight = 0.0;
+    for hook in &hooks {
+        let own = G * world.body(*hook).unwrap().mass().mass;
+        let held = world.body_wrench(*hook).unwrap().force.z;
+        assert!((held / own - 1.0).abs() < 5e-3, "{held} of {own}");
+        weight += own;
+    }
+    let view = world.rod(rod).unwrap();
+    weight += G * (0..view.n_elements()).map(|e| view.mass_per_length(e) * view.rest_lengths()[e]).sum::<f64>();
+    let pinned: f64 = pins.iter().map(|p| world.grip_wrench(*p).unwrap().force.z).sum();
+    assert!((pinned / weight - 1.0).abs() < 5e-3, "{pinned} of {weight}");
 }

@@ -37,13 +37,16 @@ pub(crate) struct BodyRow {
     size: f64,
     /// Compliance of the constraint \[m/N\].
     compliance: f64,
+    /// Slip still to be undone and friction force at the start of the substep.
     residual_slip: DVec3,
+    friction_before: DVec3,
     /// Force on the first along the axes \[N\].
     pub force: DVec3,
 }
 
-/// Compliance of a contact over that of a free body in a substep: what keeps redundant contacts apart.
-const GIVE: f64 = 1e-6;
+/// Compliance of a contact over that of a free body in a substep: it tells redundant contacts apart. A body lies as much
+/// of `g h^2` deep.
+const GIVE: f64 = 1e-3;
 
 /// How far a place may be from one of the iterate before to be the same, over the size of the smaller body.
 const SAME: f64 = 0.5;
@@ -82,6 +85,7 @@ impl BodyRows {
                     size: 0.0,
                     compliance: 0.0,
                     residual_slip: c.residual_slip,
+                    friction_before: c.friction,
                     force: DVec3::from_array(axes.map(|axis| axis.dot(c.force()))),
                 });
             }
@@ -136,6 +140,7 @@ impl BodyRows {
                     size,
                     compliance: GIVE * motion.span * motion.span / mass,
                     residual_slip: DVec3::ZERO,
+                    friction_before: DVec3::ZERO,
                     force: DVec3::ZERO,
                 };
                 row.measure(state, motion);
@@ -149,6 +154,7 @@ impl BodyRows {
                     let force: DVec3 = (0..3).map(|k| same.axes[k] * same.force[k]).sum();
                     row.force = DVec3::from_array(row.axes.map(|axis| axis.dot(force)));
                     row.residual_slip = same.residual_slip - n * n.dot(same.residual_slip);
+                    row.friction_before = same.friction_before - n * n.dot(same.friction_before);
                     row.sliding = same.sliding;
                     // Each hands on once.
                     same.shapes = [u32::MAX; 2];
@@ -226,7 +232,7 @@ pub(crate) fn add_entries(
         let middle = (points[0] + points[1]) * 0.5;
         row.moves = row.shapes.map(|shape| movers.moves(shape, middle));
         let moved = row.moved(border);
-        let slip = row.slip + row.residual_slip + moved;
+        let slip = row.slip + row.residual_slip + moved - row.friction_before * row.compliance;
         let [n, t1, t2] = row.axes;
         let [a, b] = row.moves;
         entries.push(Entry {
@@ -256,7 +262,7 @@ pub(crate) fn contacts<'a>(
         let [n, t1, t2] = row.axes;
         let friction = t1 * row.force.y + t2 * row.force.z;
         let at_limit = friction.length() >= params::AT_LIMIT * row.mu[usize::from(row.sliding)] * row.force.x;
-        let left = row.slip + row.residual_slip + friction * row.compliance;
+        let left = row.slip + row.residual_slip + (friction - row.friction_before) * row.compliance;
         Contact {
             a: Site::Surface { shape: row.shapes[0], at: row.at[0] },
             b: Site::Surface { shape: row.shapes[1], at: row.at[1] },

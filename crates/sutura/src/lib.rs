@@ -5,6 +5,7 @@
 //! positive when stretched, positive twist is the right-hand rotation about the tangent of increasing arc length.
 
 mod arrays;
+mod attempt;
 pub mod audit;
 mod budget;
 mod collide;

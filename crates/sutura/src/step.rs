@@ -1,27 +1,20 @@
 //! The step. Stage order is decided here and nowhere else.
 
-use crate::budget::{self, Settled};
-use crate::collide::{self, Clearance};
-use crate::drive::{Begun, Interval, outside_forces, predict};
-use crate::finite::all_finite;
-use crate::integrator::{self, Method, Stage, touches_anew};
+use crate::attempt::{Refused, Step, Substep, attempt, least};
+use crate::collide::Clearance;
+use crate::drive::outside_forces;
+use crate::integrator::{Method, touches_anew};
 use crate::model::Model;
-use crate::newton::{self, Outcome};
+use crate::newton::Outcome;
 use crate::params::Integrator;
-use crate::reaction::reactions;
 use crate::reel;
 use crate::rejection::Rejection;
-use crate::report::{Incident, IncidentKind, StepReport};
-use crate::rod::length::{TAUT, UNBEARABLE, let_stretch, off_length, tautest};
-use crate::rod::plastic::yield_plastic;
-use crate::row;
+use crate::report::{Incident, IncidentKind};
+use crate::rod::length::{TAUT, UNBEARABLE, let_stretch, off_length};
 use crate::scratch::Scratch;
-use crate::state::{History, State};
+use crate::state::History;
 use crate::view::View;
 use glam::DVec3;
-
-/// Halvings down to which a substep is not taken that makes energy.
-const FINE: u32 = 4;
 
 /// Halvings after which taut inextensible threads stretch, if there is still no acceptable substep.
 const GIVE_WAY: u32 = 4;
@@ -34,44 +27,6 @@ const STARVED: f64 = 1.0 / 48.0;
 
 /// Part of what a step may take that a substep which found no end in it took, for the next step to try half of it.
 const TOO_LONG: f64 = 0.5;
-
-/// A step under way. The model changes between substeps only, where reels feed.
-pub(crate) struct Step<'a, 'b> {
-    pub model: &'a mut Model,
-    pub state: &'a mut State,
-    pub scratch: &'a mut Scratch,
-    pub interval: &'a mut Interval<'b>,
-    pub report: &'a mut StepReport,
-}
-
-/// A part of a step: from `t` by `h`, after this many halvings.
-#[derive(Clone, Copy)]
-struct Substep {
-    t: f64,
-    h: f64,
-    depth: u32,
-}
-
-/// What a substep came to. Its end is in the state, to be kept or thrown away.
-struct Attempt {
-    outcome: Outcome,
-    verdict: Result<Clearance, Refused>,
-    /// Whether it was of second order although contacts changed in it or it made energy.
-    too_coarse: bool,
-}
-
-/// Why a substep is not acceptable, and because of which rods, where that is known.
-#[derive(Clone, Copy)]
-struct Refused {
-    reason: Rejection,
-    rods: Option<[u32; 2]>,
-}
-
-impl From<Rejection> for Refused {
-    fn from(reason: Rejection) -> Self {
-        Refused { reason, rods: None }
-    }
-}
 
 impl Step<'_, '_> {
     /// Advances the whole world by the interval, in equal substeps no longer than the setting.
@@ -143,17 +98,17 @@ impl Step<'_, '_> {
         }
         // Length that comes in has no past to go by.
         let mut method = if reels { Method::Euler } else { Method::of(self.model, self.state.history, sub.h) };
-        let mut attempt = self.attempt(sub, method);
-        if attempt.too_coarse {
+        let mut end = attempt(self, sub, method);
+        if end.too_coarse {
             // What stops or jumps has no second derivative to go by, and would bounce; what turns too far in a substep
             // would gain energy.
             self.scratch.saved.restore(sub.depth, self.state);
             method = Method::Euler;
-            attempt = self.attempt(sub, method);
+            end = attempt(self, sub, method);
         }
-        match attempt.verdict {
+        match end.verdict {
             Ok(clearance) => {
-                self.commit(sub, method, reels, &attempt.outcome, &clearance);
+                self.commit(sub, method, reels, &end.outcome, &clearance);
                 self.scratch.solver.effort.last = self.scratch.solver.effort.sum() - before;
                 true
             }
@@ -236,95 +191,6 @@ impl Step<'_, '_> {
         state.invalidate(History::Unknown);
         false
     }
-
-    /// The solves of a substep, each judged by itself.
-    fn attempt(&mut self, sub: Substep, method: Method) -> Attempt {
-        let halvings = self.model.settings.halvings;
-        let mut attempt: Option<Attempt> = None;
-        for stage in method.stages(sub.h) {
-            let Step { model, state, scratch, interval, report } = self;
-            let Scratch { saved, solver, budget, held, .. } = &mut **scratch;
-            let origin = saved.at(sub.depth);
-            let begun = Begun { began: sub.t, h: sub.h, stage: &stage, origin };
-            predict(model, state, solver, interval, &begun, held);
-            collide::detect(model, state, &solver.motion, &mut solver.candidates);
-            row::prepare(model, state, &solver.motion, &solver.candidates, &mut solver.rows, stage.length());
-            let outcome = newton::solve(model, state, solver, stage.span, sub.depth == halvings);
-            report.newton_iterations += outcome.iterations;
-            let verdict = judge(model, state, solver, &outcome, sub.depth == halvings).and_then(|clearance| {
-                reel::release(model, state, &solver.rods.brakes);
-                complete(model, state, solver, &stage, sub.h);
-                let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
-                if clear && all_finite(model, state) { Ok(clearance) } else { Err(Rejection::NotFinite.into()) }
-            });
-            let touches = verdict.is_ok() && method != Method::Euler && touches_anew(origin, state);
-            let mut so_far = match (attempt, verdict) {
-                (Some(Attempt { outcome: before, verdict: Ok(c), .. }), Ok(d)) => Attempt {
-                    outcome: Outcome {
-                        converged: outcome.converged && before.converged,
-                        residual: outcome.residual.max(before.residual),
-                        ..outcome
-                    },
-                    verdict: Ok(Clearance { thread: least(c.thread, d.thread), shape: least(c.shape, d.shape) }),
-                    too_coarse: touches,
-                },
-                (_, verdict) => Attempt { outcome, verdict, too_coarse: touches },
-            };
-            if touches || so_far.verdict.is_err() {
-                return so_far;
-            }
-            if stage.last {
-                let last = sub.depth >= FINE.min(halvings);
-                match budget::settle(model, state, &solver.motion, budget, origin, (sub.h, method, last)) {
-                    Settled::Well => {}
-                    Settled::Coarse => so_far.too_coarse = true,
-                    Settled::Gained if !last => so_far.verdict = Err(Rejection::EnergyGained.into()),
-                    Settled::Gained => {}
-                }
-                return so_far;
-            }
-            attempt = Some(so_far);
-        }
-        unreachable!("a method has a last solve")
-    }
-}
-
-/// Whether the end of a solve may be an end of the substep: converged, or no shorter one is left to try, within what a
-/// thread bears, and reached without a passage.
-fn judge(
-    model: &Model,
-    state: &State,
-    solver: &mut newton::Solver,
-    outcome: &Outcome,
-    shortest: bool,
-) -> Result<Clearance, Refused> {
-    let newton::Solver { motion, rods, candidates, rows, effort } = solver;
-    if !outcome.finite {
-        Err(Rejection::NotFinite.into())
-    } else if (outcome.converged || shortest) && tautest(model, rods) >= UNBEARABLE {
-        Err(Rejection::LengthNotKept.into())
-    } else if !outcome.converged && (effort.exhausted() || effort.late()) {
-        Err(Rejection::TooMuchWork.into())
-    } else if !outcome.converged && !shortest {
-        Err(Rejection::NotConverged.into())
-    } else {
-        let swept = collide::sweep(model, state, motion, candidates, rows);
-        swept.map_err(|refused| Refused { reason: refused.reason, rods: Some(refused.rods) })
-    }
-}
-
-/// Velocities from the motion, damping, tensions, plastic flow, contacts and the forces of grips at the end of a solve:
-/// what the next one, or the next substep, starts from.
-fn complete(model: &Model, state: &mut State, solver: &mut newton::Solver, stage: &Stage, h: f64) {
-    integrator::leave_rates(model, state, &solver.motion, &solver.rods.ranges, stage, h);
-    for e in solver.rods.elements() {
-        let strain = crate::rod::element_strain(model, state, e);
-        let tension = solver.rods.tension[e];
-        state.tension[e] = if model.inextensible[e] { tension } else { strain.z * model.stretch_stiffness[e].z };
-    }
-    yield_plastic(model, state);
-    row::store(model, state, &solver.motion, &mut solver.rows);
-    reactions(model, state, solver, stage.span);
 }
 
 /// Holds the rods for which the last attempt was refused where they are, for the rest of the step, which is then done
@@ -344,11 +210,4 @@ fn hold_refused(model: &Model, scratch: &mut Scratch, refused: Refused, t: f64) 
     }
     solver.effort.allowed = f64::INFINITY;
     (held.len() > before && held.len() < solver.rods.ranges.len()).then_some(rods)
-}
-
-fn least(a: Option<f64>, b: Option<f64>) -> Option<f64> {
-    match (a, b) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    }
 }

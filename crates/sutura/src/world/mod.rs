@@ -7,6 +7,7 @@ mod saved;
 mod shapes;
 mod welds;
 
+use crate::attempt::Step;
 use crate::collide::overlap::{Overlap, OverlapWith};
 use crate::drive::Interval;
 use crate::error::{Error, check};
@@ -19,7 +20,6 @@ use crate::params::{Friction, Settings, Solver};
 use crate::report::{Incident, IncidentKind, StepReport};
 use crate::scratch::Scratch;
 use crate::state::{History, State};
-use crate::step::Step;
 use crate::view::{ContactView, View};
 use glam::DVec3;
 

@@ -27,8 +27,9 @@ pub(crate) struct BodyRow {
     /// Normal from the second toward the first, and two tangents.
     axes: [DVec3; 3],
     gap: f64,
-    /// Gap of the same material at the start.
+    /// Gap of the same material at the start, and the part of an overlap there that may remain.
     start_gap: f64,
+    keep: f64,
     slip: DVec3,
     moves: [Option<Moves>; 2],
     mu: [f64; 2],
@@ -78,6 +79,7 @@ impl BodyRows {
                     axes,
                     gap: 0.0,
                     start_gap: 0.0,
+                    keep: 1.0,
                     slip: DVec3::ZERO,
                     moves: [None; 2],
                     mu: [0.0; 2],
@@ -114,6 +116,9 @@ impl BodyRows {
             let way: f64 =
                 [0, 1].map(|k| a_way(start[k], now[k], if k == 0 { &a.collider } else { &b.collider })).iter().sum();
             let reach = way + params::MARGIN * size;
+            // What is won back goes with the time, so that a shorter solve asks for less.
+            let part = (motion.span / model.settings.substep).min(1.0);
+            let keep = 1.0 - (1.0 - params::RECOVER) * part;
             // Where they would come without contact they may be past each other.
             let mut seen = now;
             if at_start && way > FAST * size {
@@ -133,6 +138,7 @@ impl BodyRows {
                     axes: axes(n),
                     gap: 0.0,
                     start_gap: 0.0,
+                    keep: 1.0,
                     slip: DVec3::ZERO,
                     moves: [None; 2],
                     mu: [friction.stick, friction.slide],
@@ -143,6 +149,7 @@ impl BodyRows {
                     friction_before: DVec3::ZERO,
                     force: DVec3::ZERO,
                 };
+                row.keep = keep;
                 row.measure(state, motion);
                 let far = |r: &&mut BodyRow| (r.at[0] - row.at[0]).length().min((r.at[1] - row.at[1]).length());
                 let same = before
@@ -196,7 +203,7 @@ fn axes(n: DVec3) -> [DVec3; 3] {
 impl BodyRow {
     /// Gap that it may keep: a part of the overlap that there was.
     fn allowed(&self) -> f64 {
-        params::RECOVER * self.start_gap.min(0.0)
+        self.keep * self.start_gap.min(0.0)
     }
 
     /// Measures gaps and slip.

@@ -138,9 +138,11 @@ fn judge(
 fn complete(model: &Model, state: &mut State, solver: &mut Solver, stage: &Stage, h: f64) {
     integrator::leave_rates(model, state, &solver.motion, &solver.rods.ranges, stage, h);
     for e in solver.rods.elements() {
-        let strain = crate::rod::element_strain(model, state, e);
-        let tension = solver.rods.tension[e];
-        state.tension[e] = if model.inextensible[e] { tension } else { strain.z * model.stretch_stiffness[e].z };
+        state.tension[e] = if model.inextensible[e] {
+            solver.rods.tension[e]
+        } else {
+            crate::rod::element_strain(model, state, e).z * model.stretch_stiffness[e].z
+        };
     }
     yield_plastic(model, state);
     row::store(model, state, &solver.motion, &mut solver.rows);

@@ -1,9 +1,11 @@
 //! Whether everything that can be read of a state is a finite number.
 
+use crate::lanes::{Vec2, lanes, pairs};
 use crate::model::Model;
-use crate::rod::element_strain;
+use crate::rod::element_strains;
 use crate::state::State;
 use glam::DVec3;
+use wide::f64x2;
 
 /// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of
 /// finite ones.
@@ -36,21 +38,25 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
 /// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending
 /// and twist add no more than a stiffness times the square of half a turn.) So is the square of every distance.
 pub(crate) fn in_proportion(model: &Model, state: &State) -> bool {
-    let (mut sum, mut squares) = (0.0, 0.0);
+    let (mut sum, mut squares) = (f64x2::ZERO, f64x2::ZERO);
+    let gravity = Vec2::load(model.settings.gravity, model.settings.gravity);
     for (_, rod) in model.rods.iter() {
-        for i in rod.particles() {
-            squares += state.position[i].length_squared();
-            sum += model.mass[i]
-                * (state.velocity[i].length_squared() + model.settings.gravity.dot(state.position[i]).abs());
+        for (low, high) in pairs(rod.particles()) {
+            let x = Vec2::load(state.position[low], state.position[high]);
+            let v = Vec2::load(state.velocity[low], state.velocity[high]);
+            squares += x.dot(&x);
+            sum += lanes(model.mass[low], model.mass[high]) * (v.dot(&v) + gravity.dot(&x).abs());
         }
-        for e in rod.elements() {
-            let c = element_strain(model, state, e);
-            let w = state.angular_velocity[e];
-            sum += model.inertia[e].max_element() * w.length_squared()
-                + (model.stretch_stiffness[e] * c).dot(c)
-                + state.tension[e].abs();
-            sum += (model.bend_stiffness[e] * state.plastic[e]).dot(state.plastic[e]);
+        for (low, high) in pairs(rod.elements()) {
+            let two = |of: &[DVec3]| Vec2::load(of[low], of[high]);
+            let c = element_strains(model, state, (low, high));
+            let (w, bent) = (two(&state.angular_velocity), two(&state.plastic));
+            let inertia = lanes(model.inertia[low].max_element(), model.inertia[high].max_element());
+            sum += inertia * w.dot(&w)
+                + two(&model.stretch_stiffness).times(&c).dot(&c)
+                + lanes(state.tension[low], state.tension[high]).abs()
+                + two(&model.bend_stiffness).times(&bent).dot(&bent);
         }
     }
-    sum.is_finite() && (4.0 * squares).is_finite()
+    sum.reduce_add().is_finite() && (4.0 * squares.reduce_add()).is_finite()
 }

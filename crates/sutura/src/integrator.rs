@@ -13,6 +13,7 @@
 //! L-stable, and needs nothing of the substep before but accelerations. Where those are not known the method of
 //! Alexander (1977) takes a substep, with the same stability function. Theory 3.1.
 
+use crate::lanes::{Quat2, Vec2, pairs};
 use crate::math::{exp, log};
 use crate::model::Model;
 use crate::motion::{BodyStart, Motion};
@@ -23,6 +24,7 @@ use crate::state::{BodyState, Contact, History, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use core::ops::Range;
 use glam::DVec3;
+use wide::f64x2;
 
 /// Blocks of a rod, and the zone of its contacts.
 type Blocks = (Range<usize>, Range<usize>);
@@ -261,11 +263,12 @@ fn carry_euler(model: &Model, state: &mut State, motion: &mut Motion, rods: &[Bl
                     strain::joint_angle(state.orientation[e - 1], state.orientation[e], model.rest_half[e]);
             }
         }
-        for e in rod.start..rod.end - 1 {
-            let q = state.orientation[e];
-            let turned = exp(state.angular_velocity[e] * (h * keep_spin));
-            state.orientation[e] = (turned * q).normalize();
-            motion.target_frame[e] = state.orientation[e];
+        for (low, high) in pairs(rod.start..rod.end - 1) {
+            let q = Quat2::load(state.orientation[low], state.orientation[high]);
+            let spin = Vec2::load(state.angular_velocity[low], state.angular_velocity[high]);
+            let turned = Quat2::exp(&spin.scaled(f64x2::splat(h * keep_spin))).product(&q).normalize().split();
+            (state.orientation[low], state.orientation[high]) = turned;
+            (motion.target_frame[low], motion.target_frame[high]) = turned;
         }
     }
 }
@@ -337,9 +340,11 @@ pub(crate) fn leave_rates(model: &Model, state: &mut State, motion: &Motion, rod
         for i in rod.clone() {
             state.velocity[i] = (state.position[i] - motion.start[i]) * (keep_linear / h);
         }
-        for e in rod.start..rod.end - 1 {
-            state.angular_velocity[e] =
-                log(state.orientation[e] * motion.start_frame[e].conjugate()) * (keep_angular / h);
+        for (low, high) in pairs(rod.start..rod.end - 1) {
+            let start = Quat2::load(motion.start_frame[low], motion.start_frame[high]);
+            let turn = Quat2::load(state.orientation[low], state.orientation[high]).product(&start.conjugate());
+            (state.angular_velocity[low], state.angular_velocity[high]) =
+                turn.log().scaled(f64x2::splat(keep_angular / h)).split();
         }
     }
 }

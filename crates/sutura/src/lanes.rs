@@ -1,8 +1,17 @@
 //! Two of everything in the lanes of a vector register: the same arithmetic on two elements at a time, with the same
 //! bits on every machine.
 
+use crate::math::{exp, log};
+use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
 use wide::f64x2;
+
+/// The indices of a range two by two, for the two lanes; one that is left over comes twice.
+#[inline(always)]
+pub(crate) fn pairs(range: Range<usize>) -> impl Iterator<Item = (usize, usize)> {
+    let end = range.end;
+    range.step_by(2).map(move |low| (low, (low + 1).min(end - 1)))
+}
 
 /// Two vectors in the lanes of one.
 #[derive(Clone, Copy)]
@@ -86,6 +95,95 @@ impl Quat2 {
     pub fn times(&self, o: &Quat2) -> Quat2 {
         let (a, b) = (&self.v, &o.v);
         Quat2 { v: a.cross(b).plus(b, self.w).plus(a, o.w), w: self.w * o.w - a.dot(b) }
+    }
+    /// The product, summed in the order of `glam`.
+    #[inline(always)]
+    pub fn product(&self, o: &Quat2) -> Quat2 {
+        let (Quat2 { v: a, w: aw }, Quat2 { v: b, w: bw }) = (*self, *o);
+        Quat2 {
+            v: Vec2 {
+                x: aw * b.x + a.x * bw + a.y * b.z - a.z * b.y,
+                y: aw * b.y - a.x * b.z + a.y * bw + a.z * b.x,
+                z: aw * b.z + a.x * b.y - a.y * b.x + a.z * bw,
+            },
+            w: aw * bw - a.x * b.x - a.y * b.y - a.z * b.z,
+        }
+    }
+    /// The rotated vectors, summed in the order of `glam`.
+    #[inline(always)]
+    pub fn rotate(&self, v: &Vec2) -> Vec2 {
+        let (Quat2 { v: b, w }, two) = (self, f64x2::splat(2.0));
+        v.scaled(*w * *w - b.dot(b)).add(&b.scaled(v.dot(b) * two)).add(&b.cross(v).scaled(*w * two))
+    }
+    #[inline(always)]
+    pub fn normalize(&self) -> Quat2 {
+        let Quat2 { v: Vec2 { x, y, z }, w } = *self;
+        let inverse = f64x2::splat(1.0) / (x * x + y * y + z * z + w * w).sqrt();
+        Quat2 { v: self.v.scaled(inverse), w: w * inverse }
+    }
+    /// `math::exp` of both.
+    #[inline(always)]
+    pub fn exp(phi: &Vec2) -> Quat2 {
+        let k = |x: f64| f64x2::splat(x);
+        let a2 = phi.dot(phi);
+        let [low, high] = a2.to_array();
+        let (s, c) = if low < 1e-3 && high < 1e-3 {
+            let s = k(0.5) - a2 * (k(1.0 / 48.0) - a2 * (k(1.0 / 3840.0) - a2 / k(645_120.0)));
+            let c = k(1.0) - a2 * (k(0.125) - a2 * (k(1.0 / 384.0) - a2 * (k(1.0 / 46_080.0) - a2 / k(10_321_920.0))));
+            (s, c)
+        } else if (1e-3..1.0).contains(&low) && (1e-3..1.0).contains(&high) {
+            let u = k(0.25) * a2;
+            let s = k(1.0)
+                - u * (k(1.0 / 6.0)
+                    - u * (k(1.0 / 120.0)
+                        - u * (k(1.0 / 5040.0)
+                            - u * (k(1.0 / 362_880.0)
+                                - u * (k(1.0 / 39_916_800.0)
+                                    - u * (k(1.0 / 6_227_020_800.0) - u / k(1_307_674_368_000.0)))))));
+            let c = k(1.0)
+                - u * (k(0.5)
+                    - u * (k(1.0 / 24.0)
+                        - u * (k(1.0 / 720.0)
+                            - u * (k(1.0 / 40_320.0)
+                                - u * (k(1.0 / 3_628_800.0)
+                                    - u * (k(1.0 / 479_001_600.0)
+                                        - u * (k(1.0 / 87_178_291_200.0) - u / k(20_922_789_888_000.0))))))));
+            (k(0.5) * s, c)
+        } else {
+            let (low, high) = phi.split();
+            return Quat2::load(exp(low), exp(high));
+        };
+        Quat2 { v: phi.scaled(s), w: c }
+    }
+    /// `math::log` of both.
+    #[inline(always)]
+    pub fn log(&self) -> Vec2 {
+        let k = |x: f64| f64x2::splat(x);
+        let (s2, w) = (self.v.dot(&self.v), self.w);
+        let ([w0, w1], [low, high], [most0, most1]) = (w.to_array(), s2.to_array(), (k(1e-3) * w * w).to_array());
+        // NaN goes the long way.
+        if w0 > 0.0 && w1 > 0.0 {
+            if self.v.x == f64x2::ZERO && self.v.y == f64x2::ZERO && self.v.z == f64x2::ZERO {
+                return self.v;
+            }
+            if low < most0 && high < most1 {
+                let u = s2 / (w * w);
+                let series = k(1.0 / 3.0) - u * (k(0.2) - u * (k(1.0 / 7.0) - u * (k(1.0 / 9.0) - u / k(11.0))));
+                return self.v.scaled(k(2.0) / w * (k(1.0) - u * series));
+            }
+            // As in `angle_over_sine`.
+            let r = (s2 + w * w).sqrt() + w;
+            let u = s2 / (r * r);
+            let [u0, u1] = u.to_array();
+            if low >= most0 && high >= most1 && u0 < 0.0157 && u1 < 0.0157 {
+                let (u2, v) = (u * u, k(1.0) / r);
+                let even = k(1.0) + u2 * (k(0.2) + u2 * (k(1.0 / 9.0) + u2 * (k(1.0 / 13.0) + u2 * k(1.0 / 17.0))));
+                let odd = k(1.0 / 3.0) + u2 * (k(1.0 / 7.0) + u2 * (k(1.0 / 11.0) + u2 * k(1.0 / 15.0)));
+                return self.v.scaled(k(4.0) * v * (even - u * odd));
+            }
+        }
+        let (low, high) = self.split();
+        Vec2::load(log(low), log(high))
     }
     /// The directors.
     #[inline(always)]
@@ -178,4 +276,50 @@ impl Sym2 {
 pub(crate) fn join(cols: [Vec2; 3]) -> (DMat3, DMat3) {
     let [(xl, xh), (yl, yh), (zl, zh)] = cols.each_ref().map(Vec2::split);
     (DMat3::from_cols(xl, yl, zl), DMat3::from_cols(xh, yh, zh))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bits(q: DQuat) -> [u64; 4] {
+        q.to_array().map(f64::to_bits)
+    }
+
+    fn quats(q: Quat2) -> [[u64; 4]; 2] {
+        <[DQuat; 2]>::from(q.split()).map(bits)
+    }
+
+    fn vectors(v: Vec2) -> [[u64; 3]; 2] {
+        <[DVec3; 2]>::from(v.split()).map(|v| v.to_array().map(f64::to_bits))
+    }
+
+    #[test]
+    fn lanes_have_the_bits_of_the_same_one_by_one() {
+        let v = |k: f64| DVec3::new((1.3 * k).sin(), (0.7 * k).cos(), (2.1 * k).sin() - 0.4);
+        let sizes = [0.0, 1e-9, 1e-3, 0.02, 0.0316, 0.0317, 0.1, 0.2, 0.3, 0.6, 0.9, 1.5, 3.0, 3.1];
+        for (i, a) in sizes.into_iter().enumerate() {
+            for (j, b) in sizes.into_iter().enumerate() {
+                let (phi, psi) = (v(i as f64) * a, v(j as f64 + 0.5) * b);
+                let (q, other) = (Quat2::exp(&Vec2::load(phi, psi)), Quat2::load(exp(psi), exp(phi)));
+                let (q0, q1) = (exp(phi), exp(psi));
+                assert_eq!(quats(q), [bits(q0), bits(q1)]);
+                assert_eq!(vectors(q.log()), [log(q0), log(q1)].map(|v| v.to_array().map(f64::to_bits)));
+                let back = Quat2::load(-q0, -q1).log();
+                assert_eq!(vectors(back), [log(-q0), log(-q1)].map(|v| v.to_array().map(f64::to_bits)));
+                assert_eq!(quats(q.product(&other)), [bits(q0 * q1), bits(q1 * q0)]);
+                let unit = q.product(&other).normalize();
+                assert_eq!(quats(unit), [bits((q0 * q1).normalize()), bits((q1 * q0).normalize())]);
+                let turned = q.conjugate().rotate(&Vec2::load(psi, phi));
+                let want = [q0.conjugate() * psi, q1.conjugate() * phi];
+                assert_eq!(vectors(turned), want.map(|v| v.to_array().map(f64::to_bits)));
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_come_to_each_index() {
+        assert!(pairs(3..3).next().is_none());
+        assert_eq!(pairs(3..8).collect::<Vec<_>>(), [(3, 4), (5, 6), (7, 7)]);
+    }
 }

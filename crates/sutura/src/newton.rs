@@ -109,8 +109,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             }
             // Where the force along the last step has turned round the step went too far: contacts opened, closed or
             // began to slide on the way. Go back to where a straight line between the two forces says that it vanishes.
-            let left =
-                work(rods, rows) + rods.work_of_turn(model, state) - row::shape::work_unforeseen(rows, &rods.step);
+            let left = work(rods, work_of_others(rods, rows)) + rods.work_of_turn(model, state)
+                - row::shape::work_unforeseen(rows, &rods.step);
             if left > -OVERSHOOT * gained {
                 break;
             }
@@ -127,14 +127,14 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         rows.border.couple(&mut rods.step, false);
         row::system::solve(state, motion, rods, rows, effort);
         row::follow::follow(rods, rows, effort);
-        gained = work(rods, rows) - rods.work_built_up(model, state);
+        let by_others = work_of_others(rods, rows);
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
         let (turn, shift) = rods.largest_move(model);
         let turn = max_or_nan(turn, rows.welds.turn_squared(rows.movers.count(), &rows.border));
         let turn = max_or_nan(turn, rows.movers.turn_squared(&rows.border)).sqrt();
         let shift = max_or_nan(shift, rows.movers.largest_move(model, &rows.border));
         scale = limit(state, motion, rods, candidates, turn);
-        let slid = apply(model, state, rods, rows, scale, true);
+        let (slid, built_up) = apply(model, state, rods, rows, scale, true);
         row::shape::predict(rows, &rods.step, scale);
         (out.turn, out.residual) = (turn * scale, shift * scale);
         if waiting && (!trusted || out.turn > SLOW * before || !rows.is_empty()) {
@@ -175,14 +175,20 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             out.converged = true;
             break;
         }
+        gained = work(rods, by_others) - built_up;
     }
     out
 }
 
-/// Work of the forces at the iterate, contact forces as last found, along the last step.
-fn work(rods: &RodScratch, rows: &Rows) -> f64 {
+/// Work of the forces at the iterate along the last step, with that of contacts and of what is shared.
+fn work(rods: &RodScratch, [contacts, shared]: [f64; 2]) -> f64 {
     let own: f64 = rods.rhs.iter().zip(&rods.step).map(|(r, z)| r.dot(*z)).sum();
-    own + row::system::work(rows, &rods.step) + rows.border.work()
+    own + contacts + shared
+}
+
+/// Work of contact forces, as last found, and of those on what rods share along the last step.
+fn work_of_others(rods: &RodScratch, rows: &Rows) -> [f64; 2] {
+    [row::system::work(rows, &rods.step), rows.border.work()]
 }
 
 /// Assembles and factors. False when a pivot is not positive.
@@ -232,9 +238,10 @@ fn limit(state: &State, motion: &Motion, rods: &RodScratch, candidates: &Candida
     by_turn.min(row::thread::limit(state, motion, candidates, &rods.step, by_turn))
 }
 
-/// Takes a part of the step, `anew` or back on the last one; the largest move of a pushed shape \[m\].
-fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> f64 {
-    rods.apply(model, state, scale, anew);
+/// Takes a part of the step, `anew` or back on the last one; the largest move of a pushed shape \[m\], and the work of
+/// the forces that the step builds up in the rods.
+fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> (f64, f64) {
+    let built_up = rods.apply(model, state, scale, anew);
     rows.welds.apply(state, rows.movers.count(), &rows.border, scale);
-    rows.movers.apply(model, state, &rows.border, scale)
+    (rows.movers.apply(model, state, &rows.border, scale), built_up)
 }

@@ -1,7 +1,6 @@
 //! The Newton matrix and right side of the rods.
 
 use crate::lanes::{Quat2, Sym2, Vec2, join, lanes};
-use crate::math::log;
 use crate::model::Model;
 use crate::motion::Motion;
 use crate::rod::constraint::ClampJoint;
@@ -323,8 +322,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
         let (x, z) = (lanes(i0.x, i1.x), lanes(i0.z, i1.z) - lanes(i0.x, i1.x));
         let turn = Quat2::load(self.motion.target_frame[low], self.motion.target_frame[high])
             .times(&Quat2::load(q[low], q[high]).conjugate());
-        let (u0, u1) = turn.split();
-        let off = Vec2::load(log(u0), log(u1));
+        let off = turn.log();
         let mut torque = off.scaled(x).plus(t, z * t.dot(&off));
         let mut inertia = Sym2::scalar(x).square(t, z);
         // Only flat sections and what is attached have different moments across.

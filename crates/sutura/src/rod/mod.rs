@@ -13,6 +13,7 @@ pub(crate) mod strain;
 pub(crate) mod tension;
 pub(crate) mod torque;
 
+use crate::lanes::{Quat2, Vec2, lanes};
 use crate::model::weld::Half;
 use crate::model::{Model, rod::RodModel};
 use crate::state::State;
@@ -25,6 +26,21 @@ pub(crate) fn element_strain(model: &Model, state: &State, e: usize) -> DVec3 {
     let d = state.position[e + 1] - state.position[e];
     let c = state.orientation[e].conjugate() * d;
     c.truncate().extend(if model.inextensible[e] { d.length() } else { c.z } - model.rest_length[e])
+}
+
+/// The same of two elements of one rod.
+#[inline(always)]
+pub(crate) fn element_strains(model: &Model, state: &State, (low, high): (usize, usize)) -> Vec2 {
+    let d = along(&state.position, (low, high));
+    let c = Quat2::load(state.orientation[low], state.orientation[high]).conjugate().rotate(&d);
+    let l = lanes(model.rest_length[low], model.rest_length[high]);
+    Vec2 { z: if model.inextensible[low] { d.dot(&d).sqrt() } else { c.z } - l, ..c }
+}
+
+/// The ways from the first to the second particles of two elements.
+#[inline(always)]
+pub(crate) fn along(x: &[DVec3], (low, high): (usize, usize)) -> Vec2 {
+    Vec2::load(x[low + 1], x[high + 1]).less(&Vec2::load(x[low], x[high]))
 }
 
 /// Force carried by element `e` along its directors \[N\].

@@ -4,7 +4,7 @@
 pub(crate) mod overlap;
 mod tree;
 
-use crate::lanes::Vec2;
+use crate::lanes::{Vec2, pairs};
 use crate::model::Model;
 use crate::model::body::BodyModel;
 use crate::model::collider::{Collider, Distance};
@@ -66,7 +66,7 @@ const BENT: f64 = 1.5;
 
 /// Total turning of two centerlines up to each element; from rod to rod it jumps.
 fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
-    total.clear();
+    total.resize(model.mass.len(), [0.0; 2]);
     let one = f64x2::splat(1.0);
     let (mut sum, mut before) = (f64x2::splat(0.0), None::<Vec2>);
     for e in 0..model.mass.len() {
@@ -84,7 +84,31 @@ fn turning(model: &Model, x: [&[DVec3]; 2], total: &mut Vec<[f64; 2]>) {
             }
             before = Some(t);
         }
-        total.push(sum.to_array());
+        total[e] = sum.to_array();
+    }
+}
+
+/// The same of one centerline, two elements at a time, in the second of the two places.
+fn turning_at_end(model: &Model, x: &[DVec3], total: &mut [[f64; 2]]) {
+    let one = f64x2::splat(1.0);
+    let (mut sum, mut last, n) = (0.0, None, x.len());
+    for (low, high) in pairs(0..n) {
+        let next = |e: usize| x[(e + 1).min(n - 1)];
+        let d = Vec2::load(next(low), next(high)).less(&Vec2::load(x[low], x[high]));
+        let t = d.scaled(one / d.dot(&d).sqrt());
+        let (first, second) = t.split();
+        let c = t.less(&Vec2::load(last.unwrap_or(first), first));
+        let c2 = c.dot(&c);
+        let angles = (c2.sqrt() * (one + c2 * f64x2::splat(1.0 / 7.0))).to_array();
+        last = Some(second);
+        for (e, angle) in [low, high].into_iter().zip(angles).take(1 + high - low) {
+            if !model.is_element(e) {
+                sum += 10.0 * BENT;
+            } else if e > 0 && model.is_element(e - 1) {
+                sum += angle;
+            }
+            total[e][1] = sum;
+        }
     }
 }
 
@@ -135,11 +159,11 @@ pub(crate) fn filter_distance(model: &Model, x: &[DVec3], weld: &WeldModel) -> f
 
 /// Rest arc of each particle from the start of its rod.
 fn arcs(model: &Model, arc: &mut Vec<f64>) {
-    arc.clear();
-    for e in 0..model.mass.len() {
-        let fresh = e == 0 || !model.is_element(e - 1);
-        let s = if fresh { 0.0 } else { arc[e - 1] + model.rest_length[e - 1] };
-        arc.push(s);
+    arc.resize(model.mass.len(), 0.0);
+    let mut s = 0.0;
+    for (arc, l) in arc.iter_mut().zip(&model.rest_length) {
+        *arc = s;
+        s = if *l > 0.0 { s + l } else { 0.0 };
     }
 }
 
@@ -151,21 +175,28 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
     let n = model.mass.len();
     arcs(model, arc);
     turning(model, [start, &state.position], turned);
-    straight.clear();
+    straight.resize(n, 0);
     let mut last = 0;
     for e in 0..n {
         last = last.max(e);
-        while last + 1 < n && [0, 1].iter().all(|k| turned[last + 1][*k] - turned[e][*k] <= STRAIGHT) {
+        let [at_start, at_end] = turned[e];
+        while turned.get(last + 1).is_some_and(|t| t[0] - at_start <= STRAIGHT && t[1] - at_end <= STRAIGHT) {
             last += 1;
         }
-        straight.push(last);
+        straight[e] = last;
     }
+    // Where each particle goes.
+    let way = |i: usize| {
+        let (from, to) = (start[i], state.position[i]);
+        Bounds { lo: from.min(to), hi: from.max(to) }
+    };
+    let mut next = if n > 0 { way(0) } else { Bounds::EMPTY };
     tree.fill(n, |e| {
-        if !model.is_element(e) {
-            return Bounds::EMPTY;
+        let here = next;
+        if e + 1 < n {
+            next = way(e + 1);
         }
-        let grow = radius[e] * (1.0 + params::REACH);
-        Bounds::of(&[start[e], start[e + 1], state.position[e], state.position[e + 1]], grow)
+        if model.is_element(e) { here.union(&next).grown(radius[e] * (1.0 + params::REACH)) } else { Bounds::EMPTY }
     });
     threads.clear();
     let skip = |leaves: Range<usize>| leaves.start >= n || straight[leaves.start] + 1 >= leaves.end.min(n);
@@ -339,9 +370,9 @@ fn outran(model: &Model, state: &State, candidates: &mut Candidates) -> bool {
         });
     left || pushed || {
         // Both lanes the same: there is one centerline to look at.
-        turning(model, [x, x], &mut candidates.turned);
+        turning_at_end(model, x, &mut candidates.turned);
         let end = &candidates.turned;
-        candidates.straight.iter().enumerate().any(|(a, b)| end[*b][0] - end[a][0] > BENT)
+        candidates.straight.iter().enumerate().any(|(a, b)| end[*b][1] - end[a][1] > BENT)
     }
 }
 

@@ -19,10 +19,14 @@ impl Bounds {
             b.lo = b.lo.min(*p);
             b.hi = b.hi.max(*p);
         }
-        Bounds { lo: b.lo - DVec3::splat(grow), hi: b.hi + DVec3::splat(grow) }
+        b.grown(grow)
     }
     #[inline(always)]
-    fn union(&self, o: &Bounds) -> Bounds {
+    pub fn grown(&self, by: f64) -> Self {
+        Bounds { lo: self.lo - DVec3::splat(by), hi: self.hi + DVec3::splat(by) }
+    }
+    #[inline(always)]
+    pub fn union(&self, o: &Bounds) -> Bounds {
         Bounds { lo: self.lo.min(o.lo), hi: self.hi.max(o.hi) }
     }
     #[inline(always)]
@@ -43,12 +47,11 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// Refills the tree with `n` leaves.
-    pub fn fill(&mut self, n: usize, leaf: impl Fn(usize) -> Bounds) {
+    pub fn fill(&mut self, n: usize, mut leaf: impl FnMut(usize) -> Bounds) {
         self.leaves = n.next_power_of_two();
-        self.nodes.clear();
         self.nodes.resize(2 * self.leaves - 1, Bounds::EMPTY);
-        for i in 0..n {
-            self.nodes[self.leaves - 1 + i] = leaf(i);
+        for (i, node) in self.nodes[self.leaves - 1..].iter_mut().enumerate() {
+            *node = if i < n { leaf(i) } else { Bounds::EMPTY };
         }
         for k in (0..self.leaves - 1).rev() {
             self.nodes[k] = self.nodes[2 * k + 1].union(&self.nodes[2 * k + 2]);

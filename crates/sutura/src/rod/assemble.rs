@@ -190,9 +190,12 @@ impl<const FLAT: bool> At<'_, FLAT> {
     /// Writes the rows of two blocks, neither of them the last of the rod.
     #[inline(always)]
     fn block(&self, rods: &mut RodScratch, low: usize, high: usize, before: &Carry) -> Carry {
+        // The angle of the joint takes long, in which the element can be worked out.
+        let turns = self.turns(low + 1, high + 1);
         let own = self.element(rods, low, high);
+        let joints = strain::joints(&turns);
         let (inertial, inertia) = self.spin(low, high, &own.axis);
-        let (moment, kt) = self.joint(rods, low + 1, high + 1);
+        let (moment, kt) = self.joint(rods, &joints, low + 1, high + 1);
         let (model, state) = (self.model, self.state);
         let w = lanes(model.mass[low], model.mass[high]) * f64x2::splat(self.inv_h2 * self.motion.heavier[0]);
         let off = Vec2::load(self.motion.target[low], self.motion.target[high])
@@ -251,7 +254,7 @@ impl<const FLAT: bool> At<'_, FLAT> {
     /// What element `e` hands on to the block after it.
     fn carry(&self, rods: &RodScratch, e: usize) -> Carry {
         let own = self.element(rods, e, e);
-        let (moment, kt) = self.joint(rods, e + 1, e + 1);
+        let (moment, kt) = self.joint(rods, &strain::joints(&self.turns(e + 1, e + 1)), e + 1, e + 1);
         Carry { force: own.force, kx: own.kx, moment, kt }
     }
 
@@ -335,20 +338,24 @@ impl<const FLAT: bool> At<'_, FLAT> {
         (torque, inertia)
     }
 
+    /// Turns of the joints before two elements.
+    #[inline(always)]
+    fn turns(&self, low: usize, high: usize) -> strain::Turns {
+        let (q, half) = (&self.state.orientation, &self.model.rest_half);
+        strain::turns([q[low - 1], q[high - 1]], [q[low], q[high]], [half[low], half[high]])
+    }
+
     /// Moments that the joints before two elements exert on the frames before them, and the stiffness against relative
     /// rotation; none where there is no joint.
     #[inline(always)]
-    fn joint(&self, rods: &RodScratch, low: usize, high: usize) -> (Vec2, Sym2) {
+    fn joint(&self, rods: &RodScratch, j: &strain::Joints, low: usize, high: usize) -> (Vec2, Sym2) {
         let (model, state) = (self.model, self.state);
-        let q = &state.orientation;
         let on = |e: usize| if e < self.last && rods.joint_on[e] { 1.0 } else { 0.0 };
-        let (half0, half1) = (model.rest_half[low], model.rest_half[high]);
-        let j = strain::joints([q[low - 1], q[high - 1]], [q[low], q[high]], [half0, half1]);
         let (k0, k1) = (model.bend_stiffness[low] * on(low), model.bend_stiffness[high] * on(high));
         let gamma = lanes(model.bend_damping[low], model.bend_damping[high]) * f64x2::splat(self.inv_h);
         let plastic = Vec2::load(state.plastic[low], state.plastic[high]);
         joint_terms::<FLAT>(
-            &j,
+            j,
             &plastic,
             &Vec2::load(self.motion.start_angle[low], self.motion.start_angle[high]),
             &Vec2::load(k0, k1),
@@ -388,7 +395,7 @@ fn joint_terms<const FLAT: bool>(
 /// The same for a clamp. The moment is that on the first of the two.
 pub(crate) fn clamp_terms(c: &ClampJoint, q: DQuat) -> (DVec3, DMat3) {
     let (q0, q1) = if c.first { (c.orientation, q) } else { (q, c.orientation) };
-    let j = strain::joints([q0; 2], [q1; 2], [c.rest_half; 2]);
+    let j = strain::joints(&strain::turns([q0; 2], [q1; 2], [c.rest_half; 2]));
     let twice = |v: DVec3| Vec2::load(v, v);
     let (moment, b) =
         joint_terms::<true>(&j, &twice(DVec3::ZERO), &twice(c.start), &twice(c.stiffness), f64x2::splat(c.damping));

@@ -37,24 +37,37 @@ pub(crate) fn joint_angle(q0: DQuat, q1: DQuat, rest_half: DQuat) -> DVec3 {
 
 /// Rate of that angle while the two frames turn with angular velocities `w` \[rad/s\], world axes.
 pub(crate) fn joint_rate(q: [DQuat; 2], w: [DVec3; 2], rest_half: DQuat) -> DVec3 {
-    let j = joints([q[0]; 2], [q[1]; 2], [rest_half; 2]);
+    let j = joints(&turns([q[0]; 2], [q[1]; 2], [rest_half; 2]));
     let (angle, c, squared) = (j.angle.split().0, j.c.to_array()[0], j.squared.to_array()[0]);
     let across = w[1] - w[0];
     let seen = DVec3::from(j.middle.map(|m| m.split().0.dot(across)));
     seen * (1.0 + c * squared) - angle * (c * angle.dot(seen))
 }
 
-/// The angles of two joints, with the derivatives.
+/// Turns of two joints from rest, after their first frames.
+pub(super) struct Turns {
+    first: Quat2,
+    turn: Quat2,
+    /// 1 / (1 + cos) of half the angle, and tan^2 of a quarter of it, as in `math::log`.
+    inverse: f64x2,
+    u: f64x2,
+}
+
 #[inline(always)]
-pub(super) fn joints(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> Joints {
+pub(super) fn turns(q0: [DQuat; 2], q1: [DQuat; 2], rest_half: [DQuat; 2]) -> Turns {
     let half = Quat2::load(rest_half[0], rest_half[1]);
     let first = Quat2::load(q0[0], q0[1]).times(&half);
     let turn = first.conjugate().times(&Quat2::load(q1[0], q1[1]).times(&half.conjugate()));
-    let one = f64x2::splat(1.0);
-    // tan^2 of a quarter of the angle, as in `math::log`.
     let s2 = turn.v.dot(&turn.v);
-    let inverse = one / ((s2 + turn.w * turn.w).sqrt() + turn.w);
-    let u = s2 * inverse * inverse;
+    let inverse = f64x2::splat(1.0) / ((s2 + turn.w * turn.w).sqrt() + turn.w);
+    Turns { first, turn, inverse, u: s2 * inverse * inverse }
+}
+
+/// The angles of two joints, with the derivatives.
+#[inline(always)]
+pub(super) fn joints(turns: &Turns) -> Joints {
+    let Turns { first, turn, inverse, u } = *turns;
+    let one = f64x2::splat(1.0);
     let [low, high] = u.to_array();
     // Both angles under 0.2 rad.
     if low < 0.0025 && high < 0.0025 {
@@ -105,7 +118,7 @@ mod tests {
             let q0 = exp(DVec3::new(0.3, -0.7, 0.2));
             let q1 = q0 * rest * exp(DVec3::new(0.6, -0.48, 0.64) * size) * rest;
             // Two joints of different angles: the second is another one at rest.
-            let j = joints([q0, rest], [q1, rest * rest * rest], [rest; 2]);
+            let j = joints(&turns([q0, rest], [q1, rest * rest * rest], [rest; 2]));
             let (angle, other) = j.angle.split();
             assert!(other.length() < 1e-15);
             let middle = DMat3::from_cols(j.middle[0].split().0, j.middle[1].split().0, j.middle[2].split().0);

@@ -319,8 +319,9 @@ impl Looks {
             let spec = SkinSpec { sides: options.sides, rings: options.rings, ..tube(thread, strand) };
             skins.push(Skin::new(&spec).map_err(|source| ExportError::Tube { thread: thread.name.clone(), source })?);
         }
-        // A plane reaches three times as far as the threads at the beginning.
-        let points = || first.threads.iter().flat_map(|t| &t.positions);
+        // A plane reaches three times as far as the threads at the beginning, where there are none as the shapes.
+        let shapes = first.shapes.iter().map(|s| &s.position).filter(|_| first.threads.is_empty());
+        let points = || first.threads.iter().flat_map(|t| &t.positions).chain(shapes.clone());
         let shape = |(shape, pose): (&crate::trajectory::Shape, &Pose)| {
             let reach = points().map(|x| (*x - pose.position).length()).fold(1e-2, f64::max);
             shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 3.0 * reach)

@@ -22,6 +22,7 @@ use sutura::glam::DVec3;
 pub enum Named {
     Thread(usize),
     Shape(usize),
+    Body(usize),
     Grip(usize),
     Probe(usize),
 }
@@ -77,6 +78,7 @@ pub enum Ref {
     On(usize, At),
     Grip(usize),
     Shape(usize),
+    Body(usize),
 }
 
 /// What an expression gives.

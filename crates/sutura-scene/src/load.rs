@@ -1,5 +1,6 @@
 //! From the text of a scene to the checked scene: the only reader of the format in `docs/formats.md`.
 
+mod bodies;
 mod happening;
 mod things;
 mod watching;
@@ -12,8 +13,8 @@ use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
 use crate::presets;
 use crate::saved::SavedFile;
 use crate::scene::{
-    Action, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef, ReelDef,
-    Scene, ShapeDef, Span, Step, Strength, Take, ThreadDef, Wanted, WeldDef, engine_place,
+    Action, BodyDef, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef,
+    ReelDef, Scene, ShapeDef, Span, Step, Strength, Take, ThreadDef, Wanted, WeldDef, engine_place,
 };
 use crate::units::{Dim, Unit, parse_unit};
 use std::path::{Path, PathBuf};
@@ -47,6 +48,7 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
         surfaces: Vec::new(),
         threads: Vec::new(),
         shapes: Vec::new(),
+        bodies: Vec::new(),
         reels: Vec::new(),
         grips: Vec::new(),
         loads: Vec::new(),
@@ -78,6 +80,7 @@ struct Loader<'d> {
     surfaces: Vec<String>,
     threads: Vec<ThreadDef>,
     shapes: Vec<ShapeDef>,
+    bodies: Vec<BodyDef>,
     reels: Vec<ReelDef>,
     grips: Vec<String>,
     loads: Vec<String>,
@@ -117,8 +120,13 @@ impl<'d> Loader<'d> {
             self.shape(&table);
             table.finish();
         }
-        if self.threads.is_empty() && root.tables("thread").is_empty() {
-            root.problem("there is no `[[thread]]`", None);
+        // After the shapes of their own, so that these have the numbers of their tables.
+        for table in root.tables("body") {
+            self.body(&table);
+            table.finish();
+        }
+        if !root.has("thread") && !root.has("body") {
+            root.problem("there is no `[[thread]]` and no `[[body]]`", None);
         }
         self.collect_names(root, start.as_ref());
         let frictions = self.friction(root);
@@ -181,6 +189,7 @@ impl<'d> Loader<'d> {
             solver_location,
             threads: std::mem::take(&mut self.threads),
             shapes: std::mem::take(&mut self.shapes),
+            bodies: std::mem::take(&mut self.bodies),
             welds,
             reels: std::mem::take(&mut self.reels),
             grips: std::mem::take(&mut self.grips),
@@ -214,6 +223,9 @@ impl<'d> Loader<'d> {
         }
         for (i, t) in root.tables("shape").iter().enumerate() {
             self.add_name(t, "name", Named::Shape(i));
+        }
+        for (i, t) in root.tables("body").iter().enumerate() {
+            self.add_name(t, "name", Named::Body(i));
         }
         if let Some((path, location)) = start {
             match SavedFile::read(path) {
@@ -310,6 +322,12 @@ impl<'d> Loader<'d> {
         found
     }
     fn find_mover(&self, value: &Value<'d>) -> Option<Mover> {
+        if let Some(name) = value.text()
+            && let Some(Named::Body(_)) = self.names.get(&name)
+        {
+            value.problem(format!("`{name}` is a free body: only gravity and contact move it"), None);
+            return None;
+        }
         self.find(value, "grip or shape", |n| match n {
             Named::Grip(i) => Some(Mover::Grip(i)),
             Named::Shape(i) => Some(Mover::Shape(i)),
@@ -639,6 +657,12 @@ fn orientation(table: &Table<'_>, default: Option<DQuat>) -> Option<DQuat> {
     };
     t.finish();
     q
+}
+
+/// `position` and `orientation`.
+fn pose(table: &Table<'_>) -> Pose {
+    let position = table.vector("position", Dim::LENGTH).unwrap_or(DVec3::ZERO);
+    Pose::new(position, orientation(table, Some(DQuat::IDENTITY)).unwrap_or(DQuat::IDENTITY))
 }
 
 fn camera(t: &Table<'_>) -> Option<Camera> {

@@ -521,7 +521,8 @@ impl Runner {
         work.max_contacts = work.max_contacts.max(report.contacts);
         self.stage.see(report);
         let mut energy = sutura::Energy::default();
-        let (mut tension, mut elongation) = (f64::NEG_INFINITY, 0.0_f64);
+        // Without a thread there is no tension.
+        let (mut tension, mut elongation) = (f64::NAN, 0.0_f64);
         for (i, rod) in self.stage.rods().enumerate() {
             let (t, e, own) = (rod.max_tension(), rod.max_elongation(), rod.energy());
             self.max_tension[i] = self.max_tension[i].max(t);
@@ -531,6 +532,11 @@ impl Runner {
             energy.stretch += own.stretch;
             energy.bend += own.bend;
             energy.twist += own.twist;
+            energy.gravity += own.gravity;
+        }
+        for body in self.stage.bodies() {
+            let own = body.energy();
+            energy.kinetic += own.kinetic;
             energy.gravity += own.gravity;
         }
         let missing = |v: Option<f64>| v.unwrap_or(f64::NAN);
@@ -785,6 +791,10 @@ impl Runner {
     /// The threads with their names.
     pub fn threads(&self) -> impl Iterator<Item = (&str, Handle<Rod>)> {
         self.scene.threads.iter().map(|t| t.name.as_str()).zip(self.stage.threads.iter().copied())
+    }
+    /// The free bodies with their names; their solids are among the shapes.
+    pub fn bodies(&self) -> impl Iterator<Item = (&str, Handle<sutura::Body>)> {
+        self.scene.bodies.iter().map(|b| b.name.as_str()).zip(self.stage.bodies.iter().copied())
     }
     /// The shapes with their names.
     pub fn shapes(&self) -> impl Iterator<Item = (&str, Handle<sutura::Shape>)> {

@@ -8,7 +8,8 @@ use crate::units::Unit;
 use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
 use sutura::{
-    Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch, WeldRest,
+    BodySpec, Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch,
+    WeldRest,
 };
 
 /// Most frames of a run: two days at 60 a second. What is recorded and probed is kept in memory.
@@ -31,7 +32,9 @@ pub struct Scene {
     pub(crate) frictions: Vec<(u32, u32, Friction, Location)>,
     pub(crate) solver_location: Location,
     pub(crate) threads: Vec<ThreadDef>,
+    /// Those of their own, then those of the bodies.
     pub(crate) shapes: Vec<ShapeDef>,
+    pub(crate) bodies: Vec<BodyDef>,
     pub(crate) welds: Vec<WeldDef>,
     pub(crate) reels: Vec<ReelDef>,
     pub(crate) grips: Vec<String>,
@@ -81,6 +84,13 @@ pub(crate) struct Strength {
 pub(crate) struct ShapeDef {
     pub name: String,
     pub spec: ShapeSpec,
+    pub location: Location,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct BodyDef {
+    pub name: String,
+    pub spec: BodySpec,
     pub location: Location,
 }
 

@@ -15,8 +15,8 @@ use sutura::input::Recorder;
 use sutura::knot::Entries;
 use sutura::math::{exp, log};
 use sutura::{
-    Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView,
-    Shape, ShapeMotion, StepReport, WeldSpec,
+    Body, BodyView, Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec,
+    Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
 };
 
 /// A grip that holds.
@@ -142,7 +142,9 @@ pub fn lesser(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 pub struct Stage {
     pub world: Recorder,
     pub threads: Vec<Handle<Rod>>,
+    /// Those of their own, then those of the bodies, as in the scene.
     pub shapes: Vec<Handle<Shape>>,
+    pub bodies: Vec<Handle<Body>>,
     reels: Vec<Handle<Reel>>,
     grips: Vec<Option<Held>>,
     loads: Vec<Option<Acting>>,
@@ -183,19 +185,28 @@ impl Stage {
         for (a, b, friction, location) in &scene.frictions {
             world.set_friction(*a, *b, *friction).map_err(|e| at(location, e))?;
         }
-        // Every thread and shape is tried, so that all problems show at once.
+        // Every thread, shape and body is tried, so that all problems show at once.
         let mut problems = Vec::new();
-        let (mut threads, mut shapes) = (Vec::new(), Vec::new());
+        let (mut threads, mut shapes, mut bodies) = (Vec::new(), Vec::new(), Vec::new());
         for thread in &scene.threads {
             match world.insert_rod(&thread.spec) {
                 Ok(h) => threads.push(h),
                 Err(e) => problems.push(thread.location.problem(e.to_string())),
             }
         }
-        for shape in &scene.shapes {
+        for shape in scene.shapes.iter().filter(|s| s.spec.motion != ShapeMotion::OnBody) {
             match world.insert_shape(&shape.spec) {
                 Ok(h) => shapes.push(h),
                 Err(e) => problems.push(shape.location.problem(e.to_string())),
+            }
+        }
+        for body in &scene.bodies {
+            match world.insert_body(&body.spec).and_then(|h| Ok((h, world.body_shapes(h)?))) {
+                Ok((h, solids)) => {
+                    bodies.push(h);
+                    shapes.extend(solids);
+                }
+                Err(e) => problems.push(body.location.problem(e.to_string())),
             }
         }
         if !problems.is_empty() {
@@ -220,6 +231,7 @@ impl Stage {
             world,
             threads,
             shapes,
+            bodies,
             reels,
             grips: vec![None; scene.grips.len()],
             loads: vec![None; scene.loads.len()],
@@ -634,6 +646,12 @@ impl Stage {
     pub fn rods(&self) -> impl Iterator<Item = RodView<'_>> {
         (0..self.threads.len()).filter_map(|i| self.rod(i))
     }
+    fn body(&self, body: usize) -> Option<BodyView<'_>> {
+        self.world.body(self.bodies[body]).ok()
+    }
+    pub fn bodies(&self) -> impl Iterator<Item = BodyView<'_>> {
+        (0..self.bodies.len()).filter_map(|i| self.body(i))
+    }
     /// Recognizes the knot of a thread as it is now.
     pub fn knot(&self, thread: usize) -> KnotReport {
         // Nothing panics while it is locked.
@@ -683,7 +701,8 @@ impl Stage {
     fn energy(&self, args: &[Ref], part: impl Fn(&sutura::Energy) -> f64) -> f64 {
         match args.first() {
             Some(Ref::Thread(t)) => self.rod(*t).map_or(f64::NAN, |r| part(&r.energy())),
-            _ => self.rods().map(|r| part(&r.energy())).sum(),
+            Some(Ref::Body(b)) => self.body(*b).map_or(f64::NAN, |b| part(&b.energy())),
+            _ => self.rods().map(|r| r.energy()).chain(self.bodies().map(|b| b.energy())).map(|e| part(&e)).sum(),
         }
     }
 
@@ -692,7 +711,7 @@ impl Stage {
         match r {
             Ref::On(t, at) => self.rod(t).map(|rod| (rod, crate::scene::engine_place(at, rod.rest_length()))),
             Ref::Grip(g) => self.grips[g].and_then(|h| Some((self.rod(h.thread)?, h.place))),
-            Ref::Thread(_) | Ref::Shape(_) => None,
+            Ref::Thread(_) | Ref::Shape(_) | Ref::Body(_) => None,
         }
     }
     /// A number of one element, or its greatest magnitude over a whole thread.
@@ -720,6 +739,7 @@ impl Stage {
         match r {
             Ref::Grip(g) => self.grip_pose(g).map_or(DVec3::NAN, |p| p.position),
             Ref::Shape(s) => self.shape_pose(s).position,
+            Ref::Body(b) => self.body(b).map_or(DVec3::NAN, |b| b.pose().position),
             _ => self.on_thread(r).map_or(DVec3::NAN, |(rod, place)| along(&rod, rod.positions(), place)),
         }
     }
@@ -727,7 +747,14 @@ impl Stage {
         match r {
             Ref::Grip(g) => self.grip_pose(g).map_or(DQuat::NAN, |p| p.orientation),
             Ref::Shape(s) => self.shape_pose(s).orientation,
+            Ref::Body(b) => self.body(b).map_or(DQuat::NAN, |b| b.pose().orientation),
             _ => self.on_thread(r).map_or(DQuat::NAN, |(rod, place)| rod.orientations()[element_of(&rod, place)]),
+        }
+    }
+    fn velocity(&self, r: Ref) -> DVec3 {
+        match r {
+            Ref::Body(b) => self.body(b).map_or(DVec3::NAN, |b| b.velocity()),
+            _ => self.on_thread(r).map_or(DVec3::NAN, |(rod, place)| along(&rod, rod.velocities(), place)),
         }
     }
     fn wrench(&self, r: Ref) -> sutura::Wrench {
@@ -735,16 +762,22 @@ impl Stage {
         match r {
             Ref::Grip(g) => self.grips[g].and_then(|h| self.world.grip_wrench(h.handle).ok()).unwrap_or(none),
             Ref::Shape(s) => self.world.shape_wrench(self.shapes[s]).unwrap_or(none),
+            Ref::Body(b) => self.world.body_wrench(self.bodies[b]).unwrap_or(none),
             _ => none,
         }
     }
     fn gap(&self, a: usize, b: Ref) -> f64 {
         let Some(rod) = self.rod(a) else { return f64::NAN };
+        let from = |shape: Handle<Shape>| {
+            let shape = self.world.shape(shape);
+            shape.map_or(f64::NAN, |s| distance::thread_shape(rod.positions(), rod.radius(), s.geometry, &s.pose))
+        };
         match b {
-            Ref::Shape(s) => self
-                .world
-                .shape(self.shapes[s])
-                .map_or(f64::NAN, |s| distance::thread_shape(rod.positions(), rod.radius(), s.geometry, &s.pose)),
+            Ref::Shape(s) => from(self.shapes[s]),
+            Ref::Body(b) => {
+                let solids = self.world.body_shapes(self.bodies[b]).unwrap_or_default();
+                solids.into_iter().map(from).fold(f64::INFINITY, f64::min)
+            }
             Ref::Thread(t) if t != a => self.rod(t).map_or(f64::NAN, |other| {
                 distance::threads((rod.positions(), rod.radius()), (other.positions(), other.radius()), None)
             }),
@@ -902,9 +935,7 @@ impl Live for Stage {
             Read::Time => Value::Number(self.time),
             Read::PhaseTime => Value::Number(self.time - self.phase_begin),
             Read::Position => Value::Vector(self.position(place)),
-            Read::Velocity => {
-                Value::Vector(self.on_thread(place).map_or(DVec3::NAN, |(rod, p)| along(&rod, rod.velocities(), p)))
-            }
+            Read::Velocity => Value::Vector(self.velocity(place)),
             Read::D1 => Value::Vector(self.orientation(place) * DVec3::X),
             Read::D2 => Value::Vector(self.orientation(place) * DVec3::Y),
             Read::D3 => Value::Vector(self.orientation(place) * DVec3::Z),
@@ -952,16 +983,22 @@ impl Live for Stage {
             Read::Speed => {
                 let fastest = |r: &RodView<'_>| r.velocities().iter().map(|v| v.length()).fold(0.0, f64::max);
                 match first {
-                    None => Value::Number(self.rods().map(|r| fastest(&r)).fold(0.0, f64::max)),
+                    None => {
+                        let bodies = self.bodies().map(|b| b.velocity().length());
+                        Value::Number(self.rods().map(|r| fastest(&r)).chain(bodies).fold(0.0, f64::max))
+                    }
                     Some(Ref::Thread(_)) => of_thread(&fastest),
-                    Some(r) => Value::Number(
-                        self.on_thread(r).map_or(f64::NAN, |(rod, p)| along(&rod, rod.velocities(), p).length()),
-                    ),
+                    Some(r) => Value::Number(self.velocity(r).length()),
                 }
             }
-            Read::Momentum => Value::Vector(match thread {
-                Some(t) => self.rod(t).map_or(DVec3::NAN, |r| r.momentum()),
-                None => self.rods().map(|r| r.momentum()).sum(),
+            Read::Spin => Value::Number(match place {
+                Ref::Body(b) => self.body(b).map_or(f64::NAN, |b| b.angular_velocity().length()),
+                _ => f64::NAN,
+            }),
+            Read::Momentum => Value::Vector(match first {
+                Some(Ref::Thread(t)) => self.rod(t).map_or(DVec3::NAN, |r| r.momentum()),
+                Some(Ref::Body(b)) => self.body(b).map_or(DVec3::NAN, |b| b.momentum()),
+                _ => self.rods().map(|r| r.momentum()).chain(self.bodies().map(|b| b.momentum())).sum(),
             }),
             Read::Contacts => Value::Number(f64::from(self.last.contacts)),
             Read::Incidents => Value::Number(self.incidents as f64),

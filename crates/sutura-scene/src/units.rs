@@ -23,6 +23,8 @@ impl Dim {
     pub const TIME: Dim = dim(0, 0, 1);
     pub const RATE: Dim = dim(0, 0, -1);
     pub const ANGLE: Dim = Dim { m: 0, kg: 0, s: 0, rad: 1 };
+    /// Angular velocity.
+    pub const SPIN: Dim = Dim { m: 0, kg: 0, s: -1, rad: 1 };
     pub const SPEED: Dim = dim(1, 0, -1);
     pub const ACCELERATION: Dim = dim(1, 0, -2);
     pub const FORCE: Dim = dim(1, 1, -2);
@@ -101,6 +103,7 @@ impl fmt::Display for Dim {
             (Dim::TIME, "a time"),
             (Dim::RATE, "a rate (1/s)"),
             (Dim::ANGLE, "an angle"),
+            (Dim::SPIN, "an angular velocity"),
             (Dim::SPEED, "a speed"),
             (Dim::ACCELERATION, "an acceleration"),
             (Dim::FORCE, "a force"),

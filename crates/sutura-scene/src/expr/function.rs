@@ -38,6 +38,7 @@ pub enum Read {
     Twist,
     Writhe,
     Speed,
+    Spin,
     Momentum,
     Contacts,
     Incidents,
@@ -74,16 +75,23 @@ pub enum Maths {
 /// Kinds of thing that a function's argument may name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wants {
-    /// A place on a thread, a grip or a shape.
+    /// A place on a thread, a grip, a shape or a body.
     Place,
     /// A place on a thread or a grip.
     OnThread,
     /// The same, or a thread for its greatest value.
     OnThreadOrAll,
+    /// A place on a thread, a grip or a body.
+    Moving,
+    /// The same, or a thread for its greatest value.
+    MovingOrAll,
     Thread,
+    ThreadOrBody,
     Grip,
     GripOrShape,
-    ThreadOrShape,
+    GripOrSolid,
+    ThreadOrSolid,
+    Body,
 }
 
 impl Wants {
@@ -92,21 +100,31 @@ impl Wants {
             Wants::Place => !matches!(thing, Ref::Thread(_)),
             Wants::OnThread => matches!(thing, Ref::On(..) | Ref::Grip(_)),
             Wants::OnThreadOrAll => matches!(thing, Ref::On(..) | Ref::Grip(_) | Ref::Thread(_)),
+            Wants::Moving => matches!(thing, Ref::On(..) | Ref::Grip(_) | Ref::Body(_)),
+            Wants::MovingOrAll => !matches!(thing, Ref::Shape(_)),
             Wants::Thread => matches!(thing, Ref::Thread(_)),
+            Wants::ThreadOrBody => matches!(thing, Ref::Thread(_) | Ref::Body(_)),
             Wants::Grip => matches!(thing, Ref::Grip(_)),
             Wants::GripOrShape => matches!(thing, Ref::Grip(_) | Ref::Shape(_)),
-            Wants::ThreadOrShape => matches!(thing, Ref::Thread(_) | Ref::Shape(_)),
+            Wants::GripOrSolid => matches!(thing, Ref::Grip(_) | Ref::Shape(_) | Ref::Body(_)),
+            Wants::ThreadOrSolid => matches!(thing, Ref::Thread(_) | Ref::Shape(_) | Ref::Body(_)),
+            Wants::Body => matches!(thing, Ref::Body(_)),
         }
     }
     pub fn words(self) -> &'static str {
         match self {
-            Wants::Place => "a place such as `silk.end`, a grip or a shape",
+            Wants::Place => "a place such as `silk.end`, a grip, a shape or a body",
             Wants::OnThread => "a place such as `silk.end`, or a grip",
             Wants::OnThreadOrAll => "a thread, a place such as `silk.end`, or a grip",
+            Wants::Moving => "a place such as `silk.end`, a grip or a body",
+            Wants::MovingOrAll => "a thread, a place such as `silk.end`, a grip or a body",
             Wants::Thread => "a thread",
+            Wants::ThreadOrBody => "a thread or a body",
             Wants::Grip => "a grip",
             Wants::GripOrShape => "a grip or a shape",
-            Wants::ThreadOrShape => "a thread or a shape",
+            Wants::GripOrSolid => "a grip, a shape or a body",
+            Wants::ThreadOrSolid => "a thread, a shape or a body",
+            Wants::Body => "a body",
         }
     }
 }
@@ -150,7 +168,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
     f("time", Read::Time, &[], 0, Gives::Number(Dim::TIME)),
     f("phase_time", Read::PhaseTime, &[], 0, Gives::Number(Dim::TIME)),
     f("position", Read::Position, &[Wants::Place], 1, Gives::Vector(Dim::LENGTH)),
-    f("velocity", Read::Velocity, &[Wants::OnThread], 1, Gives::Vector(Dim::SPEED)),
+    f("velocity", Read::Velocity, &[Wants::Moving], 1, Gives::Vector(Dim::SPEED)),
     f("d1", Read::D1, &[Wants::Place], 1, Gives::Vector(Dim::NUMBER)),
     f("d2", Read::D2, &[Wants::Place], 1, Gives::Vector(Dim::NUMBER)),
     f("d3", Read::D3, &[Wants::Place], 1, Gives::Vector(Dim::NUMBER)),
@@ -162,24 +180,25 @@ pub(super) const FUNCTIONS: &[Function] = &[
     f("torsion", Read::Torsion, &[Wants::OnThreadOrAll], 1, Gives::Number(Dim::TORQUE)),
     f("curvature", Read::Curvature, &[Wants::OnThreadOrAll], 1, Gives::Number(Dim::CURVATURE)),
     f("twist_rate", Read::TwistRate, &[Wants::OnThread], 1, Gives::Number(Dim::CURVATURE)),
-    f("force", Read::Force, &[Wants::GripOrShape], 1, Gives::Vector(Dim::FORCE)),
-    f("torque", Read::Torque, &[Wants::GripOrShape], 1, Gives::Vector(Dim::TORQUE)),
-    f("wrench", Read::Wrench, &[Wants::GripOrShape], 1, Gives::Columns(WRENCH)),
+    f("force", Read::Force, &[Wants::GripOrSolid], 1, Gives::Vector(Dim::FORCE)),
+    f("torque", Read::Torque, &[Wants::GripOrSolid], 1, Gives::Vector(Dim::TORQUE)),
+    f("wrench", Read::Wrench, &[Wants::GripOrSolid], 1, Gives::Columns(WRENCH)),
     f("distance", Read::Distance, &[Wants::Place, Wants::Place], 2, Gives::Number(Dim::LENGTH)),
-    f("gap", Read::Gap, &[Wants::Thread, Wants::ThreadOrShape], 1, Gives::Number(Dim::LENGTH)),
+    f("gap", Read::Gap, &[Wants::Thread, Wants::ThreadOrSolid], 1, Gives::Number(Dim::LENGTH)),
     f("min_clearance", Read::MinClearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("clearance", Read::Clearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("thread_clearance", Read::ThreadClearance, &[], 0, Gives::Number(Dim::NUMBER)),
     f("shape_clearance", Read::ShapeClearance, &[], 0, Gives::Number(Dim::NUMBER)),
-    f("energy", Read::Energy, &[Wants::Thread], 0, Gives::Number(Dim::TORQUE)),
-    f("kinetic_energy", Read::Kinetic, &[Wants::Thread], 0, Gives::Number(Dim::TORQUE)),
+    f("energy", Read::Energy, &[Wants::ThreadOrBody], 0, Gives::Number(Dim::TORQUE)),
+    f("kinetic_energy", Read::Kinetic, &[Wants::ThreadOrBody], 0, Gives::Number(Dim::TORQUE)),
     f("elastic_energy", Read::Elastic, &[Wants::Thread], 0, Gives::Number(Dim::TORQUE)),
     f("elongation", Read::Elongation, &[Wants::Thread], 0, Gives::Number(Dim::NUMBER)),
     f("length", Read::Length, &[Wants::Thread], 1, Gives::Number(Dim::LENGTH)),
     f("twist", Read::Twist, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("writhe", Read::Writhe, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
-    f("speed", Read::Speed, &[Wants::OnThreadOrAll], 0, Gives::Number(Dim::SPEED)),
-    f("momentum", Read::Momentum, &[Wants::Thread], 0, Gives::Vector(Dim::MOMENTUM)),
+    f("speed", Read::Speed, &[Wants::MovingOrAll], 0, Gives::Number(Dim::SPEED)),
+    f("spin", Read::Spin, &[Wants::Body], 1, Gives::Number(Dim::SPIN)),
+    f("momentum", Read::Momentum, &[Wants::ThreadOrBody], 0, Gives::Vector(Dim::MOMENTUM)),
     f("contacts", Read::Contacts, &[], 0, Gives::Number(Dim::NUMBER)),
     f("incidents", Read::Incidents, &[], 0, Gives::Number(Dim::NUMBER)),
     f("done", Read::Done, &[Wants::GripOrShape], 0, Gives::Truth),

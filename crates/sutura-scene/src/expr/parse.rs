@@ -349,7 +349,7 @@ impl Parser<'_> {
         };
         Ok((Node::Maths(maths, args), kind))
     }
-    /// An argument that names a thread, grip, shape, or a place on a thread: `silk.end`, `silk.particle[3]`, `silk[35
+    /// An argument that names a thread, grip, shape, body, or a place on a thread: `silk.end`, `silk.particle[3]`, `silk[35
     /// mm]`.
     fn reference(&mut self, function: &str, wants: Wants) -> Result<Ref, Message> {
         let Some(Token::Word(word)) = self.next() else {
@@ -359,10 +359,11 @@ impl Parser<'_> {
             Some(Named::Thread(t)) => self.place_on(t, &word)?,
             Some(Named::Grip(g)) => Ref::Grip(g),
             Some(Named::Shape(s)) => Ref::Shape(s),
-            Some(_) => return Err((format!("`{word}` is neither a thread, a grip nor a shape"), None)),
+            Some(Named::Body(b)) => Ref::Body(b),
+            Some(_) => return Err((format!("`{word}` is neither a thread, a grip, a shape nor a body"), None)),
             None => {
-                let known = self.names.which(|n| matches!(n, Named::Thread(_) | Named::Grip(_) | Named::Shape(_)));
-                return Err((format!("no thread, grip or shape is called `{word}`"), suggest(&word, known)));
+                let known = self.names.which(|n| !matches!(n, Named::Probe(_)));
+                return Err((format!("no thread, grip, shape or body is called `{word}`"), suggest(&word, known)));
             }
         };
         if wants.takes(reference) {

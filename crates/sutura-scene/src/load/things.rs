@@ -403,14 +403,12 @@ impl<'d> Loader<'d> {
         {
             value.problem("only a mesh may be open", None);
         }
-        let position = table.vector("position", Dim::LENGTH).unwrap_or(DVec3::ZERO);
-        let orientation = orientation(table, Some(DQuat::IDENTITY)).unwrap_or(DQuat::IDENTITY);
+        let pose = pose(table);
         let surface = self.surface(table, 1);
         // A stand-in for what was reported keeps the numbers of the following shapes right.
         let geometry = geometry.unwrap_or(Geometry::Sphere { radius: 1.0 });
         // Any shape may be moved or pushed by an action; one that never is stays where it is.
-        let spec =
-            ShapeSpec { geometry, pose: Pose::new(position, orientation), surface, motion: ShapeMotion::Driven, open };
+        let spec = ShapeSpec { geometry, pose, surface, motion: ShapeMotion::Driven, open };
         self.shapes.push(ShapeDef { name, spec, location: table.location() });
     }
 

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::body::{Body, BodyModel, BodySpec};
-use crate::model::shape::ShapeMotion;
+use crate::model::shape::{Shape, ShapeMotion};
 use crate::params::Solver;
 use crate::state::{BodyState, History};
 use crate::view::BodyView;
@@ -64,6 +64,12 @@ impl World {
     pub fn body(&self, body: Handle<Body>) -> Result<BodyView<'_>, Error> {
         self.model.bodies.get(body).ok_or(BODY)?;
         self.view().bodies().find(|b| b.slot() == body.index()).ok_or(BODY)
+    }
+
+    /// The shapes of a body, in the order of its solids.
+    pub fn body_shapes(&self, body: Handle<Body>) -> Result<Vec<Handle<Shape>>, Error> {
+        let model = self.model.bodies.get(body).ok_or(BODY)?;
+        Ok(model.shapes.iter().map(|(slot, _)| self.model.shapes.handle(*slot)).collect())
     }
 
     /// Force of all contacts on a body at the last accepted substep, torque about its center of mass.

@@ -18,6 +18,12 @@ name = "post"
 kind = "sphere"
 radius = "5 mm"
 position = "[10, 0, -4] mm"
+[[body]]
+name = "ball"
+kind = "sphere"
+radius = "2 mm"
+density = "1 g/cc"
+position = "[15, 0, 3] mm"
 [[grip]]
 name = "left"
 at = "start"

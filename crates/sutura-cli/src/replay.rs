@@ -101,7 +101,7 @@ fn line(input: &Input) -> String {
     }
 }
 
-/// Every number of threads and shapes, and the contacts that carry force, one a line with its bits, so that two states
+/// Every number of threads, shapes and bodies, and the contacts that carry force, one a line with its bits, so that two states
 /// can be compared.
 fn numbers(world: &World) -> String {
     let mut out = String::from("what,part,component,value,bits\n");
@@ -126,6 +126,10 @@ fn numbers(world: &World) -> String {
     for shape in world.view().shapes() {
         put(&format!("shape {} position", shape.slot), 0, &shape.pose.position.to_array());
         put(&format!("shape {} orientation", shape.slot), 0, &shape.pose.orientation.to_array());
+    }
+    for body in world.view().bodies() {
+        put(&format!("body {} velocity", body.slot()), 0, &body.velocity().to_array());
+        put(&format!("body {} angular velocity", body.slot()), 0, &body.angular_velocity().to_array());
     }
     let side = |side: &ContactSide| match *side {
         ContactSide::Thread { rod, element, s } => format!("thread {rod} element {element} place {s}"),

@@ -219,6 +219,19 @@ fn subject(header: &Header, frame: &Frame) -> Subject {
     Subject { tubes, solids: solids.collect() }
 }
 
+/// What a picture of all has to show: the threads, and where there are none what has an end of the shapes.
+fn places(subject: &Subject) -> Vec<DVec3> {
+    if !subject.tubes.is_empty() {
+        return subject.tubes.iter().flat_map(|t| t.points.iter().copied()).collect();
+    }
+    let corners = |solid: &Solid| {
+        let mesh = sutura::skin::shape_mesh(&solid.geometry, 8, 0.0);
+        let pose = solid.pose;
+        mesh.positions.into_iter().map(move |p| pose.transform_point(DVec3::from(p.map(f64::from))))
+    };
+    subject.solids.iter().filter(|s| s.geometry != Geometry::Plane).flat_map(corners).collect()
+}
+
 /// Two pictures at each time: all of the threads, and the knot from near.
 fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run) -> anyhow::Result<()> {
     let trajectory = &outcome.trajectory;
@@ -239,8 +252,7 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run
     let chosen = args.look.map(DVec3::from).or(camera.map(|c| -c.from));
     let direction = chosen.unwrap_or_else(|| {
         let near = still::knot_region(&at_end.tubes);
-        let seen =
-            if near.is_empty() { at_end.tubes.iter().flat_map(|t| t.points.iter().copied()).collect() } else { near };
+        let seen = if near.is_empty() { places(&at_end) } else { near };
         still::best_direction(&at_end, &seen, up)
     });
 
@@ -253,7 +265,7 @@ fn draw_stills(outcome: &Outcome, scene: &Scene, folder: &mut Folder, args: &Run
         }
         let subject = subject(&trajectory.header, frame);
         let radius = subject.tubes.iter().map(|t| t.radius).fold(0.0, f64::max);
-        let all: Vec<DVec3> = subject.tubes.iter().flat_map(|t| t.points.iter().copied()).collect();
+        let all = places(&subject);
         let near = still::knot_region(&subject.tubes);
         let whole = Look { direction: Some(direction), up: Some(up), ..Look::default() };
         let chosen = Look { at: camera.and_then(|c| c.look_at), width: camera.and_then(|c| c.width), ..whole.clone() };

@@ -42,5 +42,7 @@ sample_tests!(
     hanging_chain,
     hanging_helix,
     free_thread,
-    capstan
+    capstan,
+    rolling,
+    heap
 );

@@ -101,8 +101,8 @@ fn line(input: &Input) -> String {
     }
 }
 
-/// Every number of threads, shapes and bodies, and the contacts that carry force, one a line with its bits, so that two states
-/// can be compared.
+/// Every number of threads, shapes and bodies, and the contacts that carry force, one a line with its bits, so that two
+/// states can be compared.
 fn numbers(world: &World) -> String {
     let mut out = String::from("what,part,component,value,bits\n");
     let mut put = |what: &str, part: usize, values: &[f64]| {

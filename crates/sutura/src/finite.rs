@@ -35,8 +35,8 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
     grips && bodies && between && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
 }
 
-/// Whether the energy of every rod is a finite number, and so all that is worked out from its state. (Elastic bending
-/// and twist add no more than a stiffness times the square of half a turn.) So is the square of every distance.
+/// Whether the energy of every rod and body is a finite number, and so all that is worked out from its state. (Elastic
+/// bending and twist add no more than a stiffness times the square of half a turn.) So is the square of every distance.
 pub(crate) fn in_proportion(model: &Model, state: &State) -> bool {
     let (mut sum, mut squares) = (f64x2::ZERO, f64x2::ZERO);
     let gravity = Vec2::load(model.settings.gravity, model.settings.gravity);
@@ -58,5 +58,12 @@ pub(crate) fn in_proportion(model: &Model, state: &State) -> bool {
                 + two(&model.bend_stiffness).times(&bent).dot(&bent);
         }
     }
-    sum.reduce_add().is_finite() && (4.0 * squares.reduce_add()).is_finite()
+    let (mut of_bodies, mut far) = (0.0, 0.0);
+    for (slot, b) in state.bodies.iter() {
+        let Some(mass) = model.bodies.at(slot).map(|b| &b.mass) else { continue };
+        far += b.position.length_squared();
+        of_bodies += mass.mass * (b.velocity.length_squared() + model.settings.gravity.dot(b.position).abs());
+        of_bodies += b.angular_momentum.length_squared() / mass.moments.min_element();
+    }
+    (sum.reduce_add() + of_bodies).is_finite() && (4.0 * (squares.reduce_add() + far)).is_finite()
 }

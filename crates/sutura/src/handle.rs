@@ -83,6 +83,14 @@ impl<T> Slots<T> {
     {
         self.slots.clone_from(&from.slots);
     }
+    /// The values in slots that have the generations of others.
+    pub(crate) fn like<U>(&self, other: &Slots<U>) -> Self
+    where
+        T: Clone,
+    {
+        let value = |k: usize| self.slots.get(k).and_then(|(_, v)| v.clone());
+        Slots { slots: other.slots.iter().enumerate().map(|(k, (g, _))| (*g, value(k))).collect() }
+    }
     /// Empties a slot.
     pub(crate) fn empty(&mut self, index: u32) {
         self.slots[index as usize].1 = None;

@@ -231,11 +231,14 @@ fn leave_rates_of_bodies(model: &Model, state: &mut State, motion: &Motion, stag
             continue;
         };
         let reached = momentum(body.mass.moments, start.base, now, stage.span);
-        now.acceleration = (now.position - start.target) * (over * motion.heavier[0]);
-        now.torque = (reached - start.momentum) * (motion.heavier[1] / stage.span);
+        let acceleration = (now.position - start.target) * (over * motion.heavier[0]);
+        if model.settings.integrator == Integrator::TrBdf2 {
+            now.acceleration = acceleration;
+            now.torque = (reached - start.momentum) * (motion.heavier[1] / stage.span);
+        }
         if stage.weights.is_some() {
             let (keep, keep_spin) = if stage.last { half_damping(model, h) } else { (1.0, 1.0) };
-            now.velocity = (start.carried + now.acceleration * stage.span) * keep;
+            now.velocity = (start.carried + acceleration * stage.span) * keep;
             now.angular_momentum = reached * keep_spin;
         } else {
             let (keep, keep_spin) = fade(model, h);

@@ -89,6 +89,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
     let (mut way, mut unsolved) = (f64::INFINITY, 0);
     while out.iterations < settings.newton_max && !effort.exhausted() && !effort.late() {
         out.iterations += 1;
+        let shared = rows.border.count() as f64;
+        effort.now += shared * shared * shared / 3.0 + 5000.0 * candidates.solids.len() as f64;
         effort.now +=
             600.0 * model.mass.len() as f64 + 200.0 * (candidates.threads.len() + candidates.shapes.len()) as f64;
         row::shape::update_active_set(model, state, motion, rows, out.iterations == 1);
@@ -125,7 +127,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             torque_correction.apply(system, rod, zone, &motion.torque, step);
         }
         rows.border.couple(&mut rods.step, false);
-        row::system::solve(state, motion, rods, rows, effort);
+        row::system::solve(model, state, motion, rods, rows, effort);
         row::follow::follow(rods, rows, effort);
         let by_others = work_of_others(rods, rows);
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
@@ -169,7 +171,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             && rows.solved()
             && brake::settled(model, state, &rods.brakes)
             && row::shape::converged(model, state, motion, rows, &rods.step, out.iterations)
-            && row::body::converged(&rows.bodies.rows)
+            && row::body::converged(model, state, motion, &mut rows.bodies.rows)
             && !row::extend(model, state, motion, candidates, rows)
         {
             out.converged = true;

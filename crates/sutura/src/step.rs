@@ -188,6 +188,9 @@ impl Step<'_, '_> {
         // Rest: what moved into this state must not push again.
         state.velocity.fill(DVec3::ZERO);
         state.angular_velocity.fill(DVec3::ZERO);
+        for (_, body) in state.bodies.iter_mut() {
+            (body.velocity, body.angular_momentum) = (DVec3::ZERO, DVec3::ZERO);
+        }
         state.invalidate(History::Unknown);
         false
     }

@@ -149,7 +149,7 @@ impl<'a> View<'a> {
             WeldView { weld, pose: Pose::new(position, state.weld_orientation[slot as usize]), slot: slot as usize }
         })
     }
-    /// Contacts that carry force: those of threads with threads, then those with shapes.
+    /// Contacts that carry force: those of threads with threads, those of threads with shapes, then those of bodies.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + use<'a> {
         let (model, state) = (self.model, self.state);
         let side = move |site: Site| match site {

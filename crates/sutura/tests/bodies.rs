@@ -289,3 +289,30 @@ fn a_thread_bears_the_bodies_that_hang_on_it() {
     let pinned: f64 = pins.iter().map(|p| world.grip_wrench(*p).unwrap().force.z).sum();
     assert!((pinned / weight - 1.0).abs() < 5e-3, "{pinned} of {weight}");
 }
+
+/// A ball that hits a free plate off its center turns it and does not pass it.
+#[test]
+fn a_fast_ball_does_not_pass_a_free_plate() {
+    for (speed, off) in [(3.0, 8e-3), (10.0, 8e-3), (30.0, 3e-3), (45.0, 1e-3)] {
+        let mut world = world(DVec3::ZERO, 0.3);
+        let plate = Geometry::Box { half_sides: DVec3::new(0.01, 0.01, 5e-4) };
+        let plate = world.insert_body(&BodySpec::solid(plate, DENSITY, Pose::IDENTITY)).unwrap();
+        let at = Pose::at(DVec3::new(off, 0.0, 0.02));
+        let ball = BodySpec::solid(Geometry::Sphere { radius: 1e-3 }, DENSITY, at);
+        let ball = world.insert_body(&BodySpec { velocity: DVec3::Z * -speed, ..ball }).unwrap();
+        let momentum = |b| world.body(b).unwrap().momentum();
+        let before = momentum(ball);
+        for _ in 0..2 {
+            world.step(DT);
+        }
+        let momentum = |b| world.body(b).unwrap().momentum();
+        assert!((momentum(ball) + momentum(plate) - before).length() < 1e-9 * before.length());
+        // Without restitution a free plate hit at r takes 1 / (1 + m (1/M + r^2 / I)) of what stops the ball.
+        let mass = world.body(plate).unwrap().mass();
+        let m = world.body(ball).unwrap().mass().mass;
+        let inertia = mass.mass * (4e-4 + 1e-6) / 12.0;
+        let wanted = 1.0 / (1.0 + m * (1.0 / mass.mass + off * off / inertia));
+        let taken = momentum(plate).z / before.z;
+        assert!((taken / wanted - 1.0).abs() < 0.1, "{speed} m/s at {off}: the plate took {taken} for {wanted}");
+    }
+}

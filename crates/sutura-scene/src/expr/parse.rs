@@ -349,8 +349,8 @@ impl Parser<'_> {
         };
         Ok((Node::Maths(maths, args), kind))
     }
-    /// An argument that names a thread, grip, shape, body, or a place on a thread: `silk.end`, `silk.particle[3]`, `silk[35
-    /// mm]`.
+    /// An argument that names a thread, grip, shape, body, or a place on a thread: `silk.end`, `silk.particle[3]`,
+    /// `silk[35 mm]`.
     fn reference(&mut self, function: &str, wants: Wants) -> Result<Ref, Message> {
         let Some(Token::Word(word)) = self.next() else {
             return Err((format!("`{function}` needs the name of a thing"), None));

@@ -104,7 +104,8 @@ pub(crate) struct Manifolds {
     workspace: Option<ContactManifoldsWorkspace>,
 }
 
-/// Finds the places where two solids are nearer than `reach`: up to four a pair of convex ones.
+/// Finds the places where two solids are nearer than `reach`. (Of meshes, and of boxes and cylinders on planes, parry
+/// allocates.)
 pub(crate) fn touches(
     [a, b]: [&Collider; 2],
     [pose_a, pose_b]: [&Pose; 2],
@@ -140,6 +141,7 @@ pub(crate) fn touches(
         }
     } else {
         one.clear();
+        (one.local_n1, one.local_n2) = (DVec3::ZERO, DVec3::ZERO);
         let done = dispatcher.contact_manifold_convex_convex(&relative, dynamic(a), dynamic(b), None, None, reach, one);
         if done.is_ok() {
             take(one);
@@ -302,6 +304,15 @@ impl Collider {
         }
         let (s, d, _) = if lo.1.value < hi.1.value { lo } else { hi };
         (s > 0.0 && s < 1.0 && d.value < below).then_some((s, d))
+    }
+
+    /// Half of the smallest side of its box.
+    pub fn half_side(&self) -> f64 {
+        if matches!(self, Collider::Plane) {
+            return f64::INFINITY;
+        }
+        let (lo, hi) = self.bounds(&Pose::IDENTITY);
+        0.5 * (hi - lo).min_element()
     }
 
     /// Distance from the origin beyond which nothing of a solid is.

@@ -119,6 +119,10 @@ impl Model {
     pub(crate) fn body_of(&self, shape: u32) -> Option<&BodyModel> {
         self.bodies.at(self.shapes.at(shape)?.body?)
     }
+    /// Where a shape is in its body.
+    pub(crate) fn local_of(&self, shape: u32) -> Option<&crate::math::Pose> {
+        self.body_of(shape)?.shapes.iter().find(|(slot, _)| *slot == shape).map(|(_, local)| local)
+    }
     /// Friction between two surfaces.
     pub(crate) fn friction_between(&self, a: u32, b: u32) -> Friction {
         let key = (a.min(b), a.max(b));

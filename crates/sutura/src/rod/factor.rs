@@ -177,8 +177,8 @@ pub(crate) struct System {
     pub after: Vec<DMat3>,
     /// Whether a block is one of a rod whose elements have multipliers.
     pub tied: Vec<bool>,
-    /// ContactSystem of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it has
-    /// none.
+    /// ContactSystem of each element's multiplier to its two particles, and its compliance, > 0; no coupling where it
+    /// has none.
     pub ties: Vec<([DVec3; 2], f64)>,
     /// Right side of each multiplier's row.
     pub right: Vec<f64>,

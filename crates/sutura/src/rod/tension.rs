@@ -142,8 +142,8 @@ impl RodScratch {
         out.abs() > TRUSTED * kept
     }
 
-    /// Largest elongation by which an element of an inextensible thread is off what its tension makes it: a second-order
-    /// error of the turn that Newton just made.
+    /// Largest elongation by which an element of an inextensible thread is off what its tension makes it: a
+    /// second-order error of the turn that Newton just made.
     pub fn length_error(&self, model: &Model, state: &State) -> f64 {
         let mut worst = 0.0;
         for (_, rod) in model.rods.iter().filter(|(_, r)| r.stretch == crate::Stretch::Inextensible) {

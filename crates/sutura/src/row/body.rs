@@ -1,13 +1,12 @@
 //! Contact of bodies with each other and with other shapes: hard, with Coulomb friction, in the small contact problem.
 //!
-//! A pair of solids touches at up to four places, which are found anew at each iterate; a place that is near one of the
+//! A pair of solids touches at a few places, which are found anew at each iterate; a place that is near one of the
 //! iterate before takes over its force. Slip is that of the material that is at the place now, so that what rolls does
 //! not slip.
 
 use crate::collide::Candidates;
 use crate::math::{Pose, log};
 use crate::model::Model;
-use crate::model::body::BodyModel;
 use crate::model::collider::{Manifolds, Touch, touches};
 use crate::motion::Motion;
 use crate::params;
@@ -45,8 +44,8 @@ pub(crate) struct BodyRow {
     pub force: DVec3,
 }
 
-/// Compliance of a contact over that of a free body in a substep: it tells redundant contacts apart. A body lies as much
-/// of `g h^2` deep.
+/// Compliance of a contact over that of a free body in a substep: it tells redundant contacts apart. A body lies as
+/// much of `g h^2` deep.
 const GIVE: f64 = 1e-3;
 
 /// How far a place may be from one of the iterate before to be the same, over the size of the smaller body.
@@ -92,16 +91,16 @@ impl BodyRows {
                 });
             }
         }
-        self.find(model, state, motion, candidates, true);
+        self.find(model, state, motion, candidates);
     }
 
     /// Finds the rows at an iterate; those of the one before hand on their forces.
     pub fn update(&mut self, model: &Model, state: &State, motion: &Motion, candidates: &Candidates) {
         core::mem::swap(&mut self.before, &mut self.rows);
-        self.find(model, state, motion, candidates, false);
+        self.find(model, state, motion, candidates);
     }
 
-    fn find(&mut self, model: &Model, state: &State, motion: &Motion, candidates: &Candidates, at_start: bool) {
+    fn find(&mut self, model: &Model, state: &State, motion: &Motion, candidates: &Candidates) {
         let BodyRows { rows, before, manifolds } = self;
         rows.clear();
         for pair in &candidates.solids {
@@ -119,9 +118,9 @@ impl BodyRows {
             // What is won back goes with the time, so that a shorter solve asks for less.
             let part = (motion.span / model.settings.substep).min(1.0);
             let keep = 1.0 - (1.0 - params::RECOVER) * part;
-            // Where they would come without contact they may be past each other.
+            // The iterate may have them past each other.
             let mut seen = now;
-            if at_start && way > FAST * size {
+            if way > FAST * size {
                 let mut normals = [DVec3::ZERO; 2];
                 for (seen, normal) in [start, now].into_iter().zip(&mut normals) {
                     touches([&a.collider, &b.collider], seen, reach, manifolds, |t| *normal += t.normal);
@@ -150,7 +149,7 @@ impl BodyRows {
                     force: DVec3::ZERO,
                 };
                 row.keep = keep;
-                row.measure(state, motion);
+                row.measure(model, state, motion);
                 let far = |r: &&mut BodyRow| (r.at[0] - row.at[0]).length().min((r.at[1] - row.at[1]).length());
                 let same = before
                     .iter_mut()
@@ -190,9 +189,10 @@ fn a_way(from: &Pose, to: &Pose, collider: &crate::model::collider::Collider) ->
     (to.position - from.position).length() + turn * collider.reach()
 }
 
-/// Length of the body of a shape: its radius of gyration.
+/// A length of a solid of a body: its thickness, or the radius of gyration of the body.
 fn size_of(model: &Model, shape: u32) -> f64 {
-    model.body_of(shape).map_or(f64::INFINITY, BodyModel::size)
+    let half_side = || model.shapes.at(shape).map_or(f64::INFINITY, |s| s.collider.half_side());
+    model.body_of(shape).map_or(f64::INFINITY, |body| body.size().min(half_side()))
 }
 
 fn axes(n: DVec3) -> [DVec3; 3] {
@@ -207,14 +207,19 @@ impl BodyRow {
     }
 
     /// Measures gaps and slip.
-    fn measure(&mut self, state: &State, motion: &Motion) {
+    fn measure(&mut self, model: &Model, state: &State, motion: &Motion) {
         let pose = |poses: &[Pose], side: usize| poses[self.shapes[side] as usize];
         let [now, start] = [&state.shape_pose, &motion.start_shape_pose].map(|poses| [pose(poses, 0), pose(poses, 1)]);
         let n = self.axes[0];
         let points = [0, 1].map(|side| now[side].transform_point(self.at[side]));
         let before = [0, 1].map(|side| start[side].transform_point(self.at[side]));
         let middle = (points[0] + points[1]) * 0.5;
-        let slip = way_at(&start[0], &now[0], middle) - way_at(&start[1], &now[1], middle);
+        // Of what rolls the arc is counted from the body's own center.
+        let way = |side: usize| {
+            let inward = model.local_of(self.shapes[side]).map_or(Pose::IDENTITY, |local| local.inverse());
+            way_at(&start[side].compose(&inward), &now[side].compose(&inward), middle)
+        };
+        let slip = way(0) - way(1);
         self.gap = n.dot(points[0] - points[1]);
         self.start_gap = n.dot(before[0] - before[1]);
         self.slip = slip - n * n.dot(slip);
@@ -229,12 +234,16 @@ impl BodyRow {
 
 /// Adds all rows to the contact system.
 pub(crate) fn add_entries(
+    model: &Model,
     state: &State,
+    motion: &Motion,
     rows: &mut [BodyRow],
     (movers, border): (&Movers, &Border),
     entries: &mut Vec<Entry>,
 ) {
     for (k, row) in rows.iter_mut().enumerate() {
+        // Newton may have gone back since they were found.
+        row.measure(model, state, motion);
         let points = [0, 1].map(|side| state.shape_pose[row.shapes[side] as usize].transform_point(row.at[side]));
         let middle = (points[0] + points[1]) * 0.5;
         row.moves = row.shapes.map(|shape| movers.moves(shape, middle));
@@ -260,12 +269,13 @@ pub(crate) fn add_entries(
 
 /// What the next substep starts from.
 pub(crate) fn contacts<'a>(
+    model: &'a Model,
     state: &'a State,
     motion: &'a Motion,
     rows: &'a mut [BodyRow],
 ) -> impl Iterator<Item = Contact> + use<'a> {
     rows.iter_mut().filter(|r| r.force.x > 0.0).map(|row| {
-        row.measure(state, motion);
+        row.measure(model, state, motion);
         let [n, t1, t2] = row.axes;
         let friction = t1 * row.force.y + t2 * row.force.z;
         let at_limit = friction.length() >= params::AT_LIMIT * row.mu[usize::from(row.sliding)] * row.force.x;
@@ -287,6 +297,9 @@ pub(crate) fn contacts<'a>(
 }
 
 /// Whether the iterate keeps the gaps.
-pub(crate) fn converged(rows: &[BodyRow]) -> bool {
-    rows.iter().all(|r| r.gap > r.allowed() - params::SLACK * r.size)
+pub(crate) fn converged(model: &Model, state: &State, motion: &Motion, rows: &mut [BodyRow]) -> bool {
+    rows.iter_mut().all(|r| {
+        r.measure(model, state, motion);
+        r.gap > r.allowed() - params::SLACK * r.size
+    })
 }

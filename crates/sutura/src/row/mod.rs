@@ -92,6 +92,7 @@ pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mu
     let threads = thread::contacts(state, motion, &rows.threads);
     let Rows { shapes, bodies, .. } = rows;
     contacts.set(threads.chain(shape::contacts(model, state, motion, shapes)).chain(body::contacts(
+        model,
         state,
         motion,
         &mut bodies.rows,

@@ -7,7 +7,7 @@
 //! problem ([`system`]), which decides all of them at once; Newton alone would switch them on and off from one
 //! iteration to the next.
 //!
-//! Friction is a tangential spring from the friction_before of the last substep (Cundall and Strack 1979), as stiff as the
+//! Friction is a tangential spring from the anchor of the last substep (Cundall and Strack 1979), as stiff as the
 //! normal one: while the trial force `f0 - k * slip` is within mu times the normal force it sticks, and does not creep;
 //! beyond, the force stays on the disc. Both forces act at the centerline.
 //! The friction of rows that slide follows their normal forces within each iteration ([`follow`](crate::row::follow)).
@@ -61,7 +61,7 @@ pub(crate) struct ShapeRow {
     /// Friction force at the start of the substep, in the tangent plane then, and slip that was still to be undone.
     friction_before: DVec3,
     residual_slip: DVec3,
-    /// Compliance with which it last effective_compliance the small problem \[m/N\].
+    /// Compliance with which it was last in the small problem \[m/N\].
     effective_compliance: f64,
     /// Direction of the element, and, between its particles, that of the thread as a smooth curve.
     along: DVec3,
@@ -455,8 +455,8 @@ fn between(rows: &[ShapeRow], shape: u32, from: f64, to: f64) -> Range<usize> {
     rows.partition_point(|r| r.key() < (shape, from))..rows.partition_point(|r| r.key() <= (shape, to))
 }
 
-/// Gives each old contact's force and friction_before to the row on the same shape that is nearest to it along the thread, or on
-/// another one in its place: the half of a post that a thread touches now may be the other one.
+/// Gives each old contact's force and friction to the row on the same shape that is nearest to it along the thread, or
+/// on another one in its place: the half of a post that a thread touches now may be the other one.
 fn inherit(old: &[Contact], model: &Model, rows: &mut [ShapeRow]) {
     for c in old {
         let (Some((element, s)), Some(shape)) = (c.a.thread(), c.b.shape()) else { continue };
@@ -479,7 +479,7 @@ fn inherit(old: &[Contact], model: &Model, rows: &mut [ShapeRow]) {
 }
 
 /// Leaves one of rows at one place against shapes that lie in one another, such as the halves of a post: the one that
-/// is nearer now and next, or where they are alike the one that force_before force. Both stay where one overtakes the other.
+/// is nearer now and next, or where they are alike the one that bore force. Both stay where one overtakes the other.
 fn merge(rows: &mut Vec<ShapeRow>) {
     rows.sort_unstable_by(|a, b| {
         a.element
@@ -531,17 +531,17 @@ fn evaluate(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow) -
 fn slip(state: &State, motion: &Motion, row: &ShapeRow) -> DVec3 {
     let e = row.element as usize;
     let (n, p) = (row.normal, state.position[e].lerp(state.position[e + 1], row.s));
-    let force_before = surface_motion(
+    let taken_along = surface_motion(
         &motion.start_shape_pose[row.shape as usize],
         &state.shape_pose[row.shape as usize],
         p - n * row.radius,
     );
-    let slip = p - motion.start[e].lerp(motion.start[e + 1], row.s) - force_before + row.residual_slip;
+    let slip = p - motion.start[e].lerp(motion.start[e + 1], row.s) - taken_along + row.residual_slip;
     slip - n * n.dot(slip)
 }
 
 /// Looks at a firm row: its normal force and stiffness, and the friction force that would undo all slip. In the first
-/// iteration the row is linearized where it force_before its force: Newton starts where velocity leads, which may be just
+/// iteration the row is linearized where it bore its force: Newton starts where velocity leads, which may be just
 /// off the surface.
 fn evaluate_penalty(model: &Model, state: &State, motion: &Motion, row: &mut ShapeRow, first: bool) -> DVec3 {
     evaluate(model, state, motion, row);
@@ -549,10 +549,10 @@ fn evaluate_penalty(model: &Model, state: &State, motion: &Motion, row: &mut Sha
     let depth = (-row.gap).max(0.0);
     row.pressed = row.hardness * depth * depth;
     if first && row.force_before > row.pressed {
-        let force_before = (row.force_before / row.hardness).sqrt();
+        let depth_before = (row.force_before / row.hardness).sqrt();
         row.pressed = row.force_before;
-        row.stiffness = 2.0 * row.hardness * force_before;
-        row.normal_force = row.force_before + row.stiffness * (-row.gap - force_before);
+        row.stiffness = 2.0 * row.hardness * depth_before;
+        row.normal_force = row.force_before + row.stiffness * (-row.gap - depth_before);
     } else {
         row.stiffness = 2.0 * row.hardness * depth;
         row.normal_force = row.pressed;

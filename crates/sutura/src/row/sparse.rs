@@ -54,7 +54,7 @@ pub(crate) struct Sparse {
     /// First block of each zone, and its node.
     zones: Vec<(usize, usize)>,
     diagonal: Vec<Mat6>,
-    /// ContactSystem of each node to the next one, zero at the end of a zone.
+    /// Coupling of each node to the next one, zero at the end of a zone.
     next: Vec<Option<Mat6>>,
     sites: Vec<Place>,
     fronts: Vec<Front>,

@@ -2,12 +2,13 @@
 //!
 //! Each [`Entry`] is one contact. With W the inverse of the rods' Newton matrix and G the Jacobian of the contacts, `S
 //! = G W G^T` is the compliance between contacts. Newton's step without contact gives the right side, the contact
-//! forces follow from S ([`active_set`]), and then the step that they cause. (A contact sweep that moves particles by their
-//! own inertia, m / h^2, cannot hold: the rod behind them is 10^5 times stiffer.)
+//! forces follow from S ([`active_set`]), and then the step that they cause. (A contact sweep that moves particles by
+//! their own inertia, m / h^2, cannot hold: the rod behind them is 10^5 times stiffer.)
 //!
 //! [`active_set`]: crate::row::active_set
 
 use crate::effort::Effort;
+use crate::model::Model;
 use crate::motion::Motion;
 use crate::params;
 use crate::rod::constraint::NodeConstraint;
@@ -349,7 +350,14 @@ pub(crate) fn zones(ranges: &mut [(Range<usize>, Range<usize>)], rows: &Rows) {
 }
 
 /// Finds the contact forces at this iterate and adds the step that they cause to `rods.step`.
-pub(crate) fn solve(state: &State, motion: &Motion, rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort) {
+pub(crate) fn solve(
+    model: &Model,
+    state: &State,
+    motion: &Motion,
+    rods: &mut RodScratch,
+    rows: &mut Rows,
+    effort: &mut Effort,
+) {
     let may_spend = effort.allowed - effort.spent;
     let RodScratch { ranges: rods, system, step, constraint, .. } = rods;
     let work = &mut effort.now;
@@ -357,7 +365,7 @@ pub(crate) fn solve(state: &State, motion: &Motion, rods: &mut RodScratch, rows:
     entries.clear();
     thread::add_entries(state, motion, step, &mut rows.threads, entries);
     shape::add_entries(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
-    body::add_entries(state, &mut rows.bodies.rows, (&rows.movers, &rows.border), entries);
+    body::add_entries(model, state, motion, &mut rows.bodies.rows, (&rows.movers, &rows.border), entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;

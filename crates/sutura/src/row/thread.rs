@@ -10,7 +10,7 @@
 //! converge.) Nor has it an arm about the other two: a thread drawn over a post of radius R would slide at its surface
 //! by R / (R + r) of its way only, and over an edge not at all.
 //!
-//! Friction sticks to an friction_before: the tangential spring's force and what the last solve left undone are depth_before to the
+//! Friction sticks to an anchor: the tangential spring's force and what the last solve left undone are carried to the
 //! next substep.
 //!
 //! [`system`]: crate::row::system
@@ -43,7 +43,7 @@ pub(crate) struct ThreadRow {
     least: f64,
     /// How many rows bear on the same patch, itself among them, were their forces equal.
     parts: f64,
-    /// Compliance with which it last effective_compliance the small problem \[m/N\].
+    /// Compliance with which it was last in the small problem \[m/N\].
     effective_compliance: f64,
     mu: [f64; 2],
     sliding: bool,
@@ -292,8 +292,8 @@ fn merge(rows: &mut Vec<ThreadRow>) {
     });
 }
 
-/// Gives each old contact's force and friction_before to the row that is nearest to it along both threads, within an element and
-/// a half.
+/// Gives each old contact's force and friction to the row that is nearest to it along both threads, within an element
+/// and a half.
 fn inherit(old: &[Contact], rows: &mut [ThreadRow]) {
     for c in old {
         let (Some((a, s)), Some((b, t))) = (c.a.thread(), c.b.thread()) else { continue };

@@ -55,11 +55,12 @@ impl Site {
             Site::Surface { shape, .. } => (2, shape),
         }
     }
-    fn place(self) -> f64 {
+    /// Place on it, to sort by.
+    fn place(self) -> [f64; 3] {
         match self {
-            Site::Thread { s, .. } => s,
-            Site::Shape { .. } => 0.0,
-            Site::Surface { at, .. } => at.x + at.y + at.z,
+            Site::Thread { s, .. } => [s, 0.0, 0.0],
+            Site::Shape { .. } => [0.0; 3],
+            Site::Surface { at, .. } => at.to_array(),
         }
     }
 }
@@ -90,8 +91,9 @@ impl Contact {
             let ((kind, b), (_, a)) = (c.b.piece(), c.a.piece());
             if kind == 0 { (kind, a, b) } else { (kind, b, a) }
         };
-        let places = self.a.place().total_cmp(&other.a.place()).then(self.b.place().total_cmp(&other.b.place()));
-        key(self).cmp(&key(other)).then(places)
+        let places = |c: &Self| c.a.place().into_iter().chain(c.b.place());
+        let by_place = places(self).zip(places(other)).map(|(x, y)| x.total_cmp(&y)).find(|order| order.is_ne());
+        key(self).cmp(&key(other)).then(by_place.unwrap_or(core::cmp::Ordering::Equal))
     }
 }
 

@@ -152,6 +152,9 @@ impl State {
         self.history = why;
         self.acceleration.clear();
         self.angular_acceleration.clear();
+        for (_, body) in self.bodies.iter_mut() {
+            (body.acceleration, body.torque) = (DVec3::ZERO, DVec3::ZERO);
+        }
     }
     /// A copy into memory that is already there.
     pub(crate) fn copy_from(&mut self, from: &State) {

@@ -2,6 +2,7 @@
 
 use super::{BODY, World, Wrench};
 use crate::error::Error;
+use crate::finite::in_proportion;
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::body::{Body, BodyModel, BodySpec};
@@ -43,6 +44,15 @@ impl World {
         }
         let same: Handle<Body> = self.model.bodies.insert(BodyModel { mass, shapes });
         debug_assert_eq!(same, handle);
+        if !in_proportion(&self.model, &self.state) {
+            self.remove_body(handle)?;
+            return Err(Error::invalid(
+                "body",
+                "velocity",
+                "out of all proportion",
+                "numbers with which its energy is finite",
+            ));
+        }
         self.state.invalidate(History::Unknown);
         Ok(handle)
     }
@@ -76,28 +86,6 @@ impl World {
     pub fn body_wrench(&self, body: Handle<Body>) -> Result<Wrench, Error> {
         let model = self.model.bodies.get(body).ok_or(BODY)?;
         let center = self.state.bodies.get(body).ok_or(BODY)?.position;
-        let own = |shape: Option<u32>| shape.is_some_and(|k| model.shapes.iter().any(|(s, _)| *s == k));
-        let mut sum = Wrench::default();
-        for c in self.state.contacts.iter() {
-            for (site, sign) in [(c.a, 1.0), (c.b, -1.0)] {
-                if !own(site.any_shape()) {
-                    continue;
-                }
-                let point = match (site, c.a.thread()) {
-                    (crate::state::Site::Surface { shape, at }, _) => {
-                        self.state.shape_pose[shape as usize].transform_point(at)
-                    }
-                    (_, Some((element, s))) => {
-                        let e = element as usize;
-                        self.state.position[e].lerp(self.state.position[e + 1], s) - c.normal * self.radius_of(e)
-                    }
-                    _ => continue,
-                };
-                let force = c.force() * sign;
-                sum.force += force;
-                sum.torque += (point - center).cross(force);
-            }
-        }
-        Ok(sum)
+        Ok(self.contact_wrench(center, &|slot| model.shapes.iter().any(|(s, _)| *s == slot)))
     }
 }

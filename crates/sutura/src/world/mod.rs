@@ -23,7 +23,7 @@ use crate::state::{History, State};
 use crate::view::{ContactView, View};
 use glam::DVec3;
 
-/// Threads, shapes, grips and loads that move together.
+/// Threads, bodies, shapes, grips and loads that move together.
 #[derive(Default)]
 pub struct World {
     model: Model,
@@ -145,7 +145,8 @@ impl World {
         View { model: &self.model, state: &self.state }
     }
 
-    /// Contacts that carry force, at the last accepted substep: those of threads with threads, then those with shapes.
+    /// Contacts that carry force, at the last accepted substep: those of threads with threads, those of threads
+    /// with shapes, then those of bodies.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + '_ {
         self.view().contacts()
     }

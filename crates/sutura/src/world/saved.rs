@@ -4,8 +4,9 @@ use super::World;
 use crate::error::Error;
 use crate::math::Pose;
 use crate::model::grip::{Hold, LoadKind, Place};
+use crate::row::movers::place_shapes;
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{History, Site, State};
+use crate::state::{Contact, History, Site, State};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -57,6 +58,10 @@ impl World {
     /// Goes on from a state of this model, in the memory that is there, so that the next steps need not grow it again.
     fn take_up(&mut self, state: &State) {
         self.state.copy_from(state);
+        self.state.bodies = state.bodies.like(&self.model.bodies);
+        for slot in 0..self.model.bodies.len() as u32 {
+            place_shapes(&self.model, &mut self.state, slot);
+        }
         self.model.refresh_masses(&self.state.loads);
     }
 
@@ -130,10 +135,17 @@ impl World {
             Site::Shape { shape } => self.model.shapes.at(shape).is_some(),
             Site::Surface { shape, at } => self.model.shapes.at(shape).is_some() && at.is_finite(),
         };
+        let moves = |shape: u32| self.model.body_of(shape).is_some();
+        let pair = |c: &Contact| match (c.a, c.b) {
+            (Site::Thread { element: a, .. }, Site::Thread { element: b, .. }) => a < b,
+            (Site::Thread { .. }, Site::Shape { .. }) => true,
+            (Site::Surface { shape: a, .. }, Site::Surface { shape: b, .. }) => a < b && (moves(a) || moves(b)),
+            _ => false,
+        };
         let contacts = s.contacts.iter().all(|c| {
             site(c.a)
                 && site(c.b)
-                && c.elements().is_none_or(|(a, b)| a < b)
+                && pair(c)
                 && (c.normal.length() - 1.0).abs() < 1e-6
                 && c.force().is_finite()
                 && c.residual_slip.is_finite()

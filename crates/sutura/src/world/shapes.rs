@@ -6,8 +6,9 @@ use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::ShapeModel;
 use crate::model::shape::{Checked, Shape, ShapeMotion, ShapeSpec};
-use crate::state::History;
+use crate::state::{History, Site};
 use crate::view::ShapeView;
+use glam::DVec3;
 
 impl World {
     /// Adds a shape.
@@ -81,21 +82,35 @@ impl World {
         Ok(())
     }
 
-    /// Force with which threads act on a shape, at the last accepted substep, torque about its origin.
+    /// Force of all contacts on a shape, at the last accepted substep, torque about its origin.
     pub fn shape_wrench(&self, shape: Handle<Shape>) -> Result<Wrench, Error> {
         self.model.shapes.get(shape).ok_or(SHAPE)?;
         let origin = self.state.shape_pose[shape.index()].position;
+        Ok(self.contact_wrench(origin, &|slot| slot == shape.index))
+    }
+
+    /// Force of contacts on shapes, torque about a point.
+    pub(super) fn contact_wrench(&self, about: DVec3, own: &dyn Fn(u32) -> bool) -> Wrench {
         let mut sum = Wrench::default();
-        for c in self.state.contacts.iter().filter(|c| c.b.shape() == Some(shape.index)) {
-            let Some((element, s)) = c.a.thread() else { continue };
-            let e = element as usize;
-            let x = self.state.position[e].lerp(self.state.position[e + 1], s);
-            let surface = x - c.normal * self.radius_of(e);
-            let force = -c.force();
-            sum.force += force;
-            sum.torque += (surface - origin).cross(force);
+        for c in self.state.contacts.iter() {
+            for (site, sign) in [(c.a, 1.0), (c.b, -1.0)] {
+                let point = match (site, c.a.thread()) {
+                    (Site::Surface { shape, at }, _) if own(shape) => {
+                        self.state.shape_pose[shape as usize].transform_point(at)
+                    }
+                    (Site::Shape { shape }, Some((element, s))) if own(shape) => {
+                        let e = element as usize;
+                        let x = self.state.position[e].lerp(self.state.position[e + 1], s);
+                        x - c.normal * self.radius_of(e)
+                    }
+                    _ => continue,
+                };
+                let force = c.force() * sign;
+                sum.force += force;
+                sum.torque += (point - about).cross(force);
+            }
         }
-        Ok(sum)
+        sum
     }
 
     /// Reads a shape.

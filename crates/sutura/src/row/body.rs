@@ -216,7 +216,7 @@ impl BodyRow {
         let middle = (points[0] + points[1]) * 0.5;
         // Of what rolls the arc is counted from the body's own center.
         let way = |side: usize| {
-            let inward = model.local_of(self.shapes[side]).map_or(Pose::IDENTITY, |local| local.inverse());
+            let inward = model.local_of(self.shapes[side]).map_or(Pose::IDENTITY, Pose::inverse);
             way_at(&start[side].compose(&inward), &now[side].compose(&inward), middle)
         };
         let slip = way(0) - way(1);

@@ -45,6 +45,9 @@ pub(crate) struct Border {
     positive: bool,
     dense: Vec<f64>,
     small: Vec<f64>,
+    /// The factor for a part of the unknowns that the others do not depend on.
+    part: Ldl,
+    part_positive: bool,
 }
 
 impl Border {
@@ -165,6 +168,46 @@ impl Border {
         }
         self.dense.clone_from(&self.schur);
         solve_dense(&mut self.dense, v, self.count)
+    }
+
+    /// Unknowns that depend on unknown `k`, by themselves or through rods.
+    pub fn coupled(&self, k: usize) -> impl Iterator<Item = usize> + use<'_> {
+        let row = &self.schur[k * self.count..(k + 1) * self.count];
+        row.iter().enumerate().filter(|(_, v)| **v != 0.0).map(|(j, _)| j)
+    }
+
+    /// Whether unknown `k` is linked to a rod, or carries a node of it.
+    pub fn links_rod(&self, k: usize, blocks: &Range<usize>) -> bool {
+        let Column { links, carried, .. } = &self.columns[k];
+        links.iter().chain(carried).any(|(node, _)| blocks.contains(&(node / 2)))
+    }
+
+    /// Prepares for solutions of some of the unknowns, which do not depend on the others.
+    pub fn begin_part(&mut self, unknowns: &[u32]) {
+        let n = self.count;
+        if unknowns.len() == n {
+            return;
+        }
+        let Border { part, schur, .. } = self;
+        part.clear();
+        self.part_positive = unknowns
+            .iter()
+            .enumerate()
+            .all(|(k, i)| part.push(unknowns[..=k].iter().map(|j| schur[*i as usize * n + *j as usize])));
+    }
+
+    /// `schur^-1 v` for a vector over these unknowns.
+    pub fn solve_part(&mut self, unknowns: &[u32], v: &mut [f64]) {
+        if unknowns.len() == self.count {
+            self.solve_small(v);
+        } else if self.part_positive {
+            self.part.solve(v);
+        } else {
+            let mut all = vec![0.0; self.count];
+            unknowns.iter().zip(&*v).for_each(|(k, x)| all[*k as usize] = *x);
+            self.solve_small(&mut all);
+            unknowns.iter().zip(v).for_each(|(k, x)| *x = all[*k as usize]);
+        }
     }
 
     /// Couples a solution `z` of the rods alone with the unknowns under their own forces, or under those of the small

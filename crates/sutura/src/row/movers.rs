@@ -112,6 +112,10 @@ impl Movers {
         self.sliders.len() + SIX * self.bodies.len()
     }
 
+    pub fn has_bodies(&self) -> bool {
+        !self.bodies.is_empty()
+    }
+
     /// Puts what acts on them beside contact into the border.
     pub fn assemble(&mut self, model: &Model, state: &State, motion: &Motion, border: &mut Border) {
         let h = self.h;

@@ -130,9 +130,9 @@ impl Assembly {
     }
 
     /// Adds what gives way with what rods share: W grows by (H^-1 B) schur^-1 (H^-1 B)^T, and the shape or the weld
-    /// itself moves.
-    fn shared(&mut self, border: &mut Border, entries: &[Entry], s: &mut [f64]) {
-        let (m, n) = (border.count(), 3 * entries.len());
+    /// itself moves. `unknowns` are those of the border that the entries depend on.
+    fn shared(&mut self, border: &mut Border, unknowns: &[u32], entries: &[Entry], s: &mut [f64]) {
+        let (m, n) = (unknowns.len(), 3 * entries.len());
         if m == 0 {
             return;
         }
@@ -141,18 +141,23 @@ impl Assembly {
         for entry in entries {
             for unit in DVec3::AXES {
                 let from = reach.len();
-                reach.extend((0..m).map(|k| entry.ends().map(|p| p.work(unit, border.response(k))).sum::<f64>()));
+                let response = |k: &u32| entry.ends().map(|p| p.work(unit, border.response(*k as usize))).sum::<f64>();
+                reach.extend(unknowns.iter().map(response));
                 for side in &entry.sides {
                     if let Side::Shared(moves) = side {
-                        moves.columns().for_each(|(k, c)| reach[from + k] -= unit.dot(c));
+                        for (k, c) in moves.columns() {
+                            let place = unknowns.partition_point(|u| (*u as usize) < k);
+                            reach[from + place] -= unit.dot(c);
+                        }
                     }
                 }
             }
         }
+        border.begin_part(unknowns);
         for i in 0..n {
             small.clear();
             small.extend_from_slice(&reach[i * m..(i + 1) * m]);
-            border.solve_small(small);
+            border.solve_part(unknowns, small);
             for j in i..n {
                 s[i * n + j] += small.iter().zip(&reach[j * m..(j + 1) * m]).map(|(a, b)| a * b).sum::<f64>();
             }
@@ -205,7 +210,7 @@ struct Island {
     entries: Range<usize>,
     dense: Dense,
     sparse: Sparse,
-    cone: ActiveSet,
+    active_set: ActiveSet,
     /// The sparse matrix is in use; what a solution may take; the least radius of the entries.
     many: bool,
     limits: Limits,
@@ -223,9 +228,9 @@ impl Island {
         let (components, entries) = (self.components(), self.entries.clone());
         let (b, mu, force) = (&b[components.clone()], &mu[entries], &mut force[components]);
         let left = if self.many {
-            self.cone.solve(&mut self.sparse, b, mu, force, &self.limits)
+            self.active_set.solve(&mut self.sparse, b, mu, force, &self.limits)
         } else {
-            self.cone.solve(&mut self.dense, b, mu, force, &self.limits)
+            self.active_set.solve(&mut self.dense, b, mu, force, &self.limits)
         };
         left / self.smallest
     }
@@ -235,9 +240,9 @@ impl Island {
     fn respond(&mut self, change: &mut [f64]) {
         let change = &mut change[self.components()];
         let solved = if self.many {
-            self.cone.response(&mut self.sparse, change)
+            self.active_set.response(&mut self.sparse, change)
         } else {
-            self.cone.response(&mut self.dense, change)
+            self.active_set.response(&mut self.dense, change)
         };
         if !solved {
             change.fill(0.0);
@@ -245,26 +250,43 @@ impl Island {
     }
 }
 
-/// Sorts the entries by islands and finds these: rods that touch each other are of one, and all are where they share
-/// something at the border. An island is numbered as the first of its rods, so that it finds its memory again in the
-/// next iteration.
-fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize>)], shared: bool) {
+/// Sorts the entries by islands and finds these: what touches is of one, and so is what shares unknowns of the border.
+/// An island is numbered as the first of its rods, or after all rods as the first of its unknowns, so that it finds its
+/// memory again in the next iteration. Without free bodies all that shares something is one.
+fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize>)], border: &Border, bodies: bool) {
     let ContactSystem { entries, islands, active, root, .. } = coupling;
+    let (n, count) = (rods.len(), border.count());
     root.clear();
-    root.extend((0..rods.len().max(1) as u32).map(|r| if shared { 0 } else { r }));
-    // In the order of slots, which need not be that of the arrays.
-    let rod_of = |p: &Endpoint| rods.iter().position(|(blocks, _)| blocks.contains(&p.element)).unwrap_or(0);
-    for entry in entries.iter_mut() {
-        let mut ends = entry.ends().map(rod_of);
-        let first = ends.next().unwrap_or(0);
-        let second = ends.next();
-        drop(ends);
-        entry.island = first as u32;
-        let Some(second) = second else { continue };
-        let (a, b) = (root[first], root[second]);
+    root.extend((0..(n + count).max(1) as u32).map(|r| if count > 0 && !bodies { 0 } else { r }));
+    let join = |root: &mut [u32], a: usize, b: usize| {
+        let (a, b) = (root[a], root[b]);
         if a != b {
             root.iter_mut().filter(|r| **r == a.max(b)).for_each(|r| *r = a.min(b));
         }
+    };
+    if bodies {
+        for k in 0..count {
+            border.coupled(k).for_each(|j| join(root, n + k, n + j));
+            for (rod, (blocks, _)) in rods.iter().enumerate() {
+                if border.links_rod(k, blocks) {
+                    join(root, n + k, rod);
+                }
+            }
+        }
+    }
+    // In the order of slots, which need not be that of the arrays.
+    let rod_of = |p: &Endpoint| rods.iter().position(|(blocks, _)| blocks.contains(&p.element)).unwrap_or(0);
+    for entry in entries.iter_mut() {
+        let mut first = None;
+        for side in &entry.sides {
+            let mut joined = |node: usize| join(root, *first.get_or_insert(node), node);
+            match side {
+                Side::Still => {}
+                Side::Chain(endpoint) => joined(rod_of(endpoint)),
+                Side::Shared(moves) => moves.columns().for_each(|(k, _)| joined(n + k)),
+            }
+        }
+        entry.island = first.unwrap_or(0) as u32;
     }
     entries.iter_mut().for_each(|e| e.island = root[e.island as usize]);
     entries.sort_unstable_by_key(|e| match e.source {
@@ -290,9 +312,10 @@ pub(crate) struct ContactSystem {
     /// Island by island.
     entries: Vec<Entry>,
     islands: Vec<Island>,
-    /// Those in use, and that of each rod.
+    /// Those in use, that of each rod and then of each unknown of the border, and the unknowns of one.
     active: Vec<u32>,
     root: Vec<u32>,
+    unknowns: Vec<u32>,
     assembly: Assembly,
     b: Vec<f64>,
     mu: Vec<f64>,
@@ -370,8 +393,9 @@ pub(crate) fn solve(
     if rows.solver.entries.is_empty() {
         return;
     }
-    find_islands(&mut rows.solver, rods, rows.border.count() > 0);
-    let ContactSystem { entries, islands, active, assembly, b, mu, force, right, left, .. } = &mut rows.solver;
+    find_islands(&mut rows.solver, rods, &rows.border, rows.movers.has_bodies());
+    let ContactSystem { entries, islands, active, root, unknowns, assembly, b, mu, force, right, left, .. } =
+        &mut rows.solver;
     b.clear();
     mu.clear();
     force.clear();
@@ -412,12 +436,15 @@ pub(crate) fn solve(
         } else {
             island.dense.begin(n);
             assembly.compliance(system, rods, constraint, entries, &mut island.dense.s);
-            assembly.shared(&mut rows.border, entries, &mut island.dense.s);
+            unknowns.clear();
+            let first = root.len() - rows.border.count();
+            unknowns.extend((0..rows.border.count() as u32).filter(|u| root[first + *u as usize] == *k));
+            assembly.shared(&mut rows.border, unknowns, entries, &mut island.dense.s);
             finish_dense(entries, &mut island.dense.s);
         }
         if positive {
             *left = left.max(island.solve(b, mu, force));
-            *work -= island.cone.left().max(0.0);
+            *work -= island.active_set.left().max(0.0);
         } else {
             *left = f64::INFINITY;
             *work -= most;
@@ -516,7 +543,7 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
         for k in active.iter() {
             let island = &mut islands[*k as usize];
             *left = left.max(island.solve(b, mu, force));
-            *work += island.limits.work - island.cone.left().max(0.0);
+            *work += island.limits.work - island.active_set.left().max(0.0);
         }
         for (c, f) in change.iter_mut().zip(force.iter()) {
             *c = f - *c;

@@ -52,7 +52,7 @@ const GIVE: f64 = 1e-3;
 const SAME: f64 = 0.5;
 
 /// What the contact solve may leave of a gap, in thread radii, is so much of the size of a body.
-const PRECISE: f64 = 1e-3;
+const PRECISE: f64 = 1e-2;
 
 /// Way in a substep, over the size of the smaller body, from which on the two may be past each other at its end.
 const FAST: f64 = 0.25;

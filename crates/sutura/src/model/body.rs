@@ -1,7 +1,7 @@
 //! Rigid bodies: solids that move together, with the mass that their density gives them.
 
 use crate::error::{Error, check};
-use crate::math::Pose;
+use crate::math::{Pose, outer};
 use crate::model::collider::Collider;
 use crate::model::shape::{Checked, Geometry, ShapeMotion, ShapeSpec};
 use glam::{DMat3, DQuat, DVec3};
@@ -94,7 +94,10 @@ impl BodySpec {
         let (mut mass, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
         for collider in &self.colliders {
             let solid = collider.check()?;
-            let (m, center, inertia) = Collider::new(&solid.geometry)?.mass_properties(collider.density);
+            let (m, center, inertia) = match &solid.geometry {
+                Geometry::Mesh { vertices, triangles } => of_mesh(vertices, triangles, collider.density),
+                geometry => Collider::new(geometry)?.mass_properties(collider.density),
+            };
             let turn = DMat3::from_quat(collider.pose.orientation);
             let center = collider.pose.transform_point(center);
             mass += m;
@@ -136,7 +139,25 @@ impl ColliderSpec {
 
 /// Moments of inertia of a unit of mass at a place, about the origin.
 fn about(place: DVec3) -> DMat3 {
-    DMat3::IDENTITY * place.length_squared() - crate::math::outer(place, place)
+    DMat3::IDENTITY * place.length_squared() - outer(place, place)
+}
+
+/// Mass, center of mass and inertia about it of what a closed mesh bounds: the sum over the tetrahedra between its
+/// triangles and the origin, negative where a triangle faces it. (parry3d's turns the axes of a tilted mesh.)
+fn of_mesh(vertices: &[DVec3], triangles: &[[u32; 3]], density: f64) -> (f64, DVec3, DMat3) {
+    let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|k| vertices[k as usize]);
+        let six = a.dot(b.cross(c));
+        let sum = a + b + c;
+        volume += six / 6.0;
+        first += sum * (six / 24.0);
+        second += (outer(sum, sum) + outer(a, a) + outer(b, b) + outer(c, c)) * (six / 120.0);
+    }
+    let (mass, center) = (volume * density, first / volume);
+    let trace = second.col(0).x + second.col(1).y + second.col(2).z;
+    let inertia = (DMat3::IDENTITY * trace - second) * density;
+    (mass, center, inertia - about(center) * mass)
 }
 
 /// Eigenvalues and axes of a symmetric matrix (Jacobi rotations).

@@ -150,13 +150,10 @@ pub(crate) fn touches(
 }
 
 impl Collider {
-    /// Mass, center of mass and inertia about it, in the frame of the collider.
+    /// Mass, center of mass and inertia about it of a convex solid, in the frame of the collider.
     pub fn mass_properties(&self, density: f64) -> (f64, DVec3, DMat3) {
-        let p = match self {
-            Collider::Plane => return (0.0, DVec3::ZERO, DMat3::ZERO),
-            Collider::Solid(solid) => solid.mass_properties(density),
-            Collider::Surface(surface) => surface.mesh.mass_properties(density),
-        };
+        let Collider::Solid(solid) = self else { return (0.0, DVec3::ZERO, DMat3::ZERO) };
+        let p = solid.mass_properties(density);
         let turn = DMat3::from_quat(FROM_PARRY);
         (p.mass(), from_parry(p.local_com), turn * p.reconstruct_inertia_matrix() * turn.transpose())
     }

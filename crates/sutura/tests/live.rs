@@ -547,7 +547,7 @@ fn everything_is_recorded_and_done_again_bit_for_bit() {
     plain.step(DT);
     plain.remove_rod(rod).unwrap();
     let mut bytes = plain.recording().unwrap().to_bytes();
-    assert_eq!(bytes[8..12], [5, 0, 0, 0]);
+    assert_eq!(bytes[8..12], [6, 0, 0, 0]);
     bytes[8] = 2;
     let read = Recording::from_bytes(&bytes).unwrap();
     assert_eq!(read.first_difference(plain.recording().unwrap()), None);

@@ -265,8 +265,9 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 4 is the same without the input 23, version 3 also without
-/// drag and without [`ShapeSpec::open`], version 2 also without the inputs 21 and 22.
+/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24 and 25, version 4 also
+/// without the input 23, version 3 also without drag and without [`ShapeSpec::open`], version 2 also without the inputs
+/// 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
 const VERSION: u32 = 6;
 const OLDEST: u32 = 2;

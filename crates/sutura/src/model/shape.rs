@@ -1,4 +1,4 @@
-//! Shapes that threads touch: fixed, driven, or pushed along a line by a force.
+//! Shapes that threads and bodies touch: fixed, driven, pushed along a line by a force, or part of a body.
 
 use crate::error::{Error, check};
 use crate::math::Pose;

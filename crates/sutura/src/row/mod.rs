@@ -1,6 +1,6 @@
-//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance) and thread on shape
-//! ([`shape`]: firm in the rods' matrix, light in the small problem). And what rods share, at the [`border`] of their
-//! system: pushed shapes and welds.
+//! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance), thread on shape ([`shape`]:
+//! firm in the rods' matrix, light in the small problem), and bodies on each other and on shapes ([`body`]). And what
+//! rods share, at the [`border`] of their system: pushed shapes, free bodies and welds.
 
 pub(crate) mod active_set;
 pub(crate) mod body;

@@ -152,6 +152,7 @@ impl World {
     }
 
     /// What lies in each other now, each place once, threads first: where, how deep, and whether contact can part it.
+    /// Bodies that lie in each other or in shapes are not looked at: they are parted within a few substeps.
     /// What neighbors along a thread or through a weld is left out, and so is what overlaps by less than a tenth of a
     /// diameter, as loaded contacts and arcs cut into chords do. The first step after [`World::insert_rod`] and
     /// [`World::insert_shape`] says it of what was inserted ([`IncidentKind::Overlap`]).

@@ -551,7 +551,7 @@ fn everything_is_recorded_and_done_again_bit_for_bit() {
     bytes[8] = 2;
     let read = Recording::from_bytes(&bytes).unwrap();
     assert_eq!(read.first_difference(plain.recording().unwrap()), None);
-    for version in [1, 6] {
+    for version in [1, 7] {
         bytes[8] = version;
         assert!(Recording::from_bytes(&bytes).unwrap_err().to_string().contains("version"));
     }

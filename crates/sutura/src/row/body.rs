@@ -1,8 +1,8 @@
 //! Contact of bodies with each other and with other shapes: hard, with Coulomb friction, in the small contact problem.
 //!
 //! A pair of solids touches at a few places, which are found anew at each iterate; a place that is near one of the
-//! iterate before takes over its force. Slip is that of the material that is at the place now, so that what rolls does
-//! not slip.
+//! iterate before takes over its force. Slip is that of the surfaces past the place, counted along the arc, so that what
+//! rolls does not slip.
 
 use crate::collide::Candidates;
 use crate::math::{Pose, log};
@@ -30,6 +30,8 @@ pub(crate) struct BodyRow {
     start_gap: f64,
     keep: f64,
     slip: DVec3,
+    /// The place, halfway between the two surfaces.
+    middle: DVec3,
     moves: [Option<Moves>; 2],
     mu: [f64; 2],
     sliding: bool,
@@ -80,6 +82,7 @@ impl BodyRows {
                     start_gap: 0.0,
                     keep: 1.0,
                     slip: DVec3::ZERO,
+                    middle: DVec3::ZERO,
                     moves: [None; 2],
                     mu: [0.0; 2],
                     sliding: c.sliding,
@@ -137,8 +140,9 @@ impl BodyRows {
                     axes: axes(n),
                     gap: 0.0,
                     start_gap: 0.0,
-                    keep: 1.0,
+                    keep,
                     slip: DVec3::ZERO,
+                    middle: DVec3::ZERO,
                     moves: [None; 2],
                     mu: [friction.stick, friction.slide],
                     sliding: false,
@@ -148,8 +152,6 @@ impl BodyRows {
                     friction_before: DVec3::ZERO,
                     force: DVec3::ZERO,
                 };
-                row.keep = keep;
-                row.measure(model, state, motion);
                 let far = |r: &&mut BodyRow| (r.at[0] - row.at[0]).length().min((r.at[1] - row.at[1]).length());
                 let same = before
                     .iter_mut()
@@ -214,6 +216,7 @@ impl BodyRow {
         let points = [0, 1].map(|side| now[side].transform_point(self.at[side]));
         let before = [0, 1].map(|side| start[side].transform_point(self.at[side]));
         let middle = (points[0] + points[1]) * 0.5;
+        self.middle = middle;
         // Of what rolls the arc is counted from the body's own center.
         let way = |side: usize| {
             let inward = model.local_of(self.shapes[side]).map_or(Pose::IDENTITY, Pose::inverse);
@@ -242,11 +245,9 @@ pub(crate) fn add_entries(
     entries: &mut Vec<Entry>,
 ) {
     for (k, row) in rows.iter_mut().enumerate() {
-        // Newton may have gone back since they were found.
+        // Here, since Newton may have gone back since they were found.
         row.measure(model, state, motion);
-        let points = [0, 1].map(|side| state.shape_pose[row.shapes[side] as usize].transform_point(row.at[side]));
-        let middle = (points[0] + points[1]) * 0.5;
-        row.moves = row.shapes.map(|shape| movers.moves(shape, middle));
+        row.moves = row.shapes.map(|shape| movers.moves(shape, row.middle));
         let moved = row.moved(border);
         let slip = row.slip + row.residual_slip + moved - row.friction_before * row.compliance;
         let [n, t1, t2] = row.axes;

@@ -112,6 +112,17 @@ impl<T> Slots<T> {
     pub(crate) fn from_raw(slots: Vec<(u32, Option<T>)>) -> Self {
         Slots { slots }
     }
+    /// What is in each slot, up to the last that is not empty.
+    pub(crate) fn values(&self) -> Vec<Option<T>>
+    where
+        T: Clone,
+    {
+        let n = self.slots.iter().rposition(|(_, v)| v.is_some()).map_or(0, |last| last + 1);
+        self.slots[..n].iter().map(|(_, v)| v.clone()).collect()
+    }
+    pub(crate) fn of_values(values: Vec<Option<T>>) -> Self {
+        Slots { slots: values.into_iter().map(|v| (0, v)).collect() }
+    }
     pub(crate) fn len(&self) -> usize {
         self.slots.len()
     }

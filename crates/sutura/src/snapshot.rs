@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::handle::Slots;
 use crate::math::{self, Pose};
+use crate::model::body::{BodyModel, MassProperties};
 use crate::model::grip::{Drive, Hold, LoadKind, Place};
 use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
@@ -190,6 +191,7 @@ variants!(LoadKind {
     2 => Mass { place, mass, inertia },
 });
 structure!(Pose { position, orientation });
+structure!(MassProperties { mass, center, moments, axes });
 structure!(LoadState { rod, kind });
 structure!(BodyState { position, orientation, velocity, angular_momentum, acceleration, torque });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
@@ -217,7 +219,8 @@ macro_rules! state {
             fn put(&self, out: &mut Vec<u8>) {
                 let State { $($field,)* bodies } = self;
                 $($field.put(out);)*
-                if bodies.len() > 0 {
+                let bodies = bodies.values();
+                if !bodies.is_empty() {
                     bodies.put(out);
                     self.contacts.bodies().to_vec().put(out);
                 }
@@ -225,10 +228,14 @@ macro_rules! state {
             fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
                 let mut state = State { $($field: Bytes::take(input)?,)* bodies: Slots::default() };
                 if !input.left.is_empty() {
-                    state.bodies = Bytes::take(input)?;
-                    let more = Vec::<Contact>::take(input)?;
-                    let all: Vec<Contact> = state.contacts.iter().copied().chain(more).collect();
-                    state.contacts.set(all.into_iter());
+                    let bodies = Vec::<Option<BodyState>>::take(input)?;
+                    if !matches!(bodies.last(), Some(Some(_))) {
+                        return Err(damaged("its last body is none"));
+                    }
+                    state.bodies = Slots::of_values(bodies);
+                    let of_bodies = Vec::<Contact>::take(input)?;
+                    let all: Vec<Contact> = state.contacts.iter().copied().chain(of_bodies).collect();
+                    state.contacts = sorted(all)?;
                 }
                 Ok(state)
             }
@@ -295,10 +302,18 @@ impl Bytes for Contacts {
         let thread = |element: u32, s: f64| Site::Thread { element, s };
         let threads = threads.into_iter().map(|(((a, b), (s, t)), rest)| contact(thread(a, s), thread(b, t), rest));
         let on = |(((shape, element), s), rest)| contact(thread(element, s), Site::Shape { shape }, rest);
-        let mut contacts = Contacts::default();
-        contacts.set(threads.chain(shapes.into_iter().map(on)));
-        Ok(contacts)
+        sorted(threads.chain(shapes.into_iter().map(on)).collect())
     }
+}
+
+/// Contacts that are in the order in which they are written.
+fn sorted(all: Vec<Contact>) -> Result<Contacts, Error> {
+    let mut contacts = Contacts::default();
+    contacts.set(all.iter().copied());
+    if contacts.iter().zip(&all).any(|(a, b)| a.order(b).is_ne()) {
+        return Err(damaged("its contacts are out of order"));
+    }
+    Ok(contacts)
 }
 
 structure!(Build { materials, rods, shapes, welds });
@@ -449,7 +464,19 @@ pub(crate) fn write(model: &Model, state: &State) -> Vec<u8> {
     let mut out = MAGIC.to_vec();
     Build::of(model, state).put(&mut out);
     state.put(&mut out);
+    if model.bodies.iter().next().is_some() {
+        bodies_of(model).put(&mut out);
+    }
     out
+}
+
+/// What bodies consist of, each as one number.
+pub(crate) fn bodies_of(model: &Model) -> Vec<u64> {
+    let hash = |(_, b): (u32, &BodyModel)| {
+        let geometry = |&(shape, pose): &(u32, Pose)| (model.shapes.at(shape).map(|s| s.hash), pose);
+        hash_of(&(b.mass, b.shapes.iter().map(geometry).collect::<Vec<_>>()))
+    };
+    model.bodies.iter().map(hash).collect()
 }
 
 /// A snapshot as it was read.
@@ -458,6 +485,7 @@ pub(crate) struct Snapshot {
     pub materials: Option<u64>,
     /// What the world was built from, where it says so.
     pub build: Option<Build>,
+    pub bodies: Vec<u64>,
     pub state: State,
 }
 
@@ -474,10 +502,11 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Snapshot, Error> {
         _ => return Err(damaged("it does not start as a snapshot of this version")),
     };
     let state = State::take(&mut input)?;
+    let bodies = if state.bodies.len() > 0 { Bytes::take(&mut input)? } else { Vec::new() };
     if !input.left.is_empty() {
         return Err(damaged(format!("{} bytes too many", input.left.len())));
     }
-    Ok(Snapshot { materials, build, state })
+    Ok(Snapshot { materials, build, bodies, state })
 }
 
 /// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a

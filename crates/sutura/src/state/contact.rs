@@ -86,7 +86,8 @@ impl Contact {
     pub fn sites_mut(&mut self) -> [&mut Site; 2] {
         [&mut self.a, &mut self.b]
     }
-    fn order(&self, other: &Self) -> core::cmp::Ordering {
+    /// In which they are kept.
+    pub fn order(&self, other: &Self) -> core::cmp::Ordering {
         let key = |c: &Self| {
             let ((kind, b), (_, a)) = (c.b.piece(), c.a.piece());
             if kind == 0 { (kind, a, b) } else { (kind, b, a) }

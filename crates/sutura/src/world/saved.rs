@@ -3,8 +3,8 @@
 use super::World;
 use crate::error::Error;
 use crate::math::Pose;
+use crate::model::body::BodyModel;
 use crate::model::grip::{Hold, LoadKind, Place};
-use crate::row::movers::place_shapes;
 use crate::snapshot::{Build, Snapshot};
 use crate::state::{Contact, History, Site, State};
 
@@ -24,7 +24,7 @@ impl World {
     /// over, tensions follow the strains, and the integrator starts anew, as if [`World::set_material`] came after it.
     /// Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let Snapshot { materials, build, state } = crate::snapshot::read(bytes)?;
+        let Snapshot { materials, build, bodies, state } = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
         if let Some(reason) = build.and_then(|there| Build::of(&self.model, &self.state).unlike(&there)) {
             return Err(Error::Snapshot { reason });
@@ -33,7 +33,10 @@ impl World {
         crate::reel::check_lengths(&self.model, &self.state, &state).map_err(|reason| Error::Snapshot { reason })?;
         let before = self.state.clone();
         crate::reel::refit(&mut self.model, &before, &state);
+        let other = || "a body in it has another mass, or consists of something else";
         let fits = self.check_fit(&state);
+        let fits =
+            fits.and_then(|()| (bodies == crate::snapshot::bodies_of(&self.model)).then_some(()).ok_or_else(other));
         if fits.is_ok() {
             self.take_up(&state);
             if materials.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
@@ -59,9 +62,6 @@ impl World {
     fn take_up(&mut self, state: &State) {
         self.state.copy_from(state);
         self.state.bodies = state.bodies.like(&self.model.bodies);
-        for slot in 0..self.model.bodies.len() as u32 {
-            place_shapes(&self.model, &mut self.state, slot);
-        }
         self.model.refresh_masses(&self.state.loads);
     }
 
@@ -107,6 +107,15 @@ impl World {
             if !vectors.iter().all(|v| v.is_finite()) || !b.orientation.is_normalized() {
                 return Err("a body is out of range");
             }
+        }
+        let on_its_body = |(slot, model): (u32, &BodyModel)| {
+            let pose = s.bodies.at(slot).map(|b| Pose::new(b.position, b.orientation));
+            pose.is_none_or(|pose| {
+                model.shapes.iter().all(|(k, local)| s.shape_pose[*k as usize] == pose.compose(local))
+            })
+        };
+        if !self.model.bodies.iter().all(on_its_body) {
+            return Err("a shape is not where its body is");
         }
         for (_, g) in s.grips.iter() {
             let rod = self.model.rods.at(g.rod).ok_or("a grip holds a thread that is not here")?;

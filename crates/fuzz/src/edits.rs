@@ -158,7 +158,7 @@ impl Session {
                 let places =
                     (0..2 + input.below(2)).filter_map(|_| Some((pick(&self.rods, input)?, place(input)))).collect();
                 let rest = input.pick(&[WeldRest::AsInserted, WeldRest::Straight]);
-                self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest }));
+                self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest, anchor: None }));
             }
             244 => {
                 if let Some(weld) = pick(&self.welds, input) {
@@ -267,7 +267,7 @@ impl Session {
                 places.reverse();
             }
             let rest = input.pick(&[WeldRest::AsInserted, WeldRest::Straight]);
-            self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest }));
+            self.welds.extend(self.world.insert_weld(&WeldSpec { places, rest, anchor: None }));
         }
     }
 

@@ -75,7 +75,7 @@ impl<'a> Player<'a> {
             let places: Option<Vec<_>> =
                 weld.places.iter().map(|(rod, place)| Some((self.rod(*rod)?, *place))).collect();
             let weld = places.and_then(|places| {
-                let weld = self.world.insert_weld(&WeldSpec { places, rest: weld.rest });
+                let weld = self.world.insert_weld(&WeldSpec { places, rest: weld.rest, anchor: None });
                 self.done(weld)
             });
             self.welds.push(weld);

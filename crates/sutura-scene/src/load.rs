@@ -121,16 +121,21 @@ impl<'d> Loader<'d> {
             table.finish();
         }
         // After the shapes of their own, so that these have the numbers of their tables.
-        for table in root.tables("body") {
-            self.body(&table);
-            table.finish();
-        }
+        let (bodies, needles) = (root.tables("body"), root.tables("needle"));
+        bodies.iter().for_each(|table| self.body(table));
         if !root.has("thread") && !root.has("body") {
             root.problem("there is no `[[thread]]` and no `[[body]]`", None);
         }
         self.collect_names(root, start.as_ref());
         let frictions = self.friction(root);
-        let welds = read_all(root, "weld", |t| self.weld(t));
+        let mut welds = read_all(root, "weld", |t| self.weld(t));
+        welds.extend(needles.iter().filter_map(|table| self.needle(table)));
+        for (i, table) in bodies.iter().chain(&needles).enumerate() {
+            if let Some(by) = table.get("held_by").and_then(|v| self.find_body(&v)) {
+                self.bodies[i].held_by = Some(by);
+            }
+            table.finish();
+        }
         self.reels = read_all(root, "reel", |t| self.reel(t));
 
         let mut initial = Vec::new();
@@ -224,7 +229,7 @@ impl<'d> Loader<'d> {
         for (i, t) in root.tables("shape").iter().enumerate() {
             self.add_name(t, "name", Named::Shape(i));
         }
-        for (i, t) in root.tables("body").iter().enumerate() {
+        for (i, t) in root.tables("body").iter().chain(&root.tables("needle")).enumerate() {
             self.add_name(t, "name", Named::Body(i));
         }
         if let Some((path, location)) = start {
@@ -313,6 +318,9 @@ impl<'d> Loader<'d> {
     fn find_grip(&self, value: &Value<'d>) -> Option<usize> {
         self.find(value, "grip", |n| if let Named::Grip(i) = n { Some(i) } else { None })
     }
+    fn find_body(&self, value: &Value<'d>) -> Option<usize> {
+        self.find(value, "body", |n| if let Named::Body(i) = n { Some(i) } else { None })
+    }
     fn find_load(&self, value: &Value<'d>) -> Option<usize> {
         let name = value.text()?;
         let found = self.loads.iter().position(|l| *l == name);
@@ -322,15 +330,10 @@ impl<'d> Loader<'d> {
         found
     }
     fn find_mover(&self, value: &Value<'d>) -> Option<Mover> {
-        if let Some(name) = value.text()
-            && let Some(Named::Body(_)) = self.names.get(&name)
-        {
-            value.problem(format!("`{name}` is a free body: only gravity and contact move it"), None);
-            return None;
-        }
-        self.find(value, "grip or shape", |n| match n {
+        self.find(value, "grip, shape or body", |n| match n {
             Named::Grip(i) => Some(Mover::Grip(i)),
             Named::Shape(i) => Some(Mover::Shape(i)),
+            Named::Body(i) => Some(Mover::Body(i)),
             _ => None,
         })
     }

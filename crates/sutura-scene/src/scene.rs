@@ -91,6 +91,11 @@ pub(crate) struct ShapeDef {
 pub(crate) struct BodyDef {
     pub name: String,
     pub spec: BodySpec,
+    pub driven: bool,
+    /// Number of the body that holds it at first.
+    pub held_by: Option<usize>,
+    /// Point of a needle, in its frame.
+    pub tip: Option<DVec3>,
     pub location: Location,
 }
 
@@ -98,7 +103,16 @@ pub(crate) struct BodyDef {
 pub(crate) struct WeldDef {
     pub places: Vec<(usize, Place)>,
     pub rest: WeldRest,
+    pub anchor: Option<AnchorDef>,
     pub location: Location,
+}
+
+/// Where a weld is on a body, and what it bears \[N\].
+#[derive(Debug, Clone)]
+pub(crate) struct AnchorDef {
+    pub body: usize,
+    pub point: DVec3,
+    pub strength: Option<f64>,
 }
 
 #[derive(Debug, Clone)]
@@ -117,6 +131,8 @@ pub enum Mover {
     Grip(usize),
     /// A shape.
     Shape(usize),
+    /// A body.
+    Body(usize),
 }
 
 #[derive(Debug, Clone)]
@@ -137,6 +153,15 @@ pub(crate) enum Action {
     },
     Rest {
         what: Mover,
+    },
+    /// A body takes another one, rigidly.
+    Hold {
+        body: usize,
+        by: usize,
+    },
+    /// Nothing holds or drives a body any more.
+    Release {
+        body: usize,
     },
     Push {
         what: Mover,

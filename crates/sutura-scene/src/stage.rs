@@ -15,8 +15,8 @@ use sutura::input::Recorder;
 use sutura::knot::Entries;
 use sutura::math::{exp, log};
 use sutura::{
-    Body, BodyView, Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec,
-    Rod, RodView, Shape, ShapeMotion, StepReport, WeldSpec,
+    Body, BodyMotion, BodyView, Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose,
+    Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldAnchor, WeldSpec,
 };
 
 /// A grip that holds.
@@ -55,6 +55,8 @@ enum Way {
     Posed,
     /// A force along a line: direction, force \[N\], speed limit \[m/s\].
     Pushed(DVec3, f64, f64),
+    /// What acts on a body.
+    Free,
 }
 
 /// A thing that somebody else moves, or has moved. The scene's own motion of it goes on meanwhile, unseen.
@@ -145,6 +147,8 @@ pub struct Stage {
     /// Those of their own, then those of the bodies, as in the scene.
     pub shapes: Vec<Handle<Shape>>,
     pub bodies: Vec<Handle<Body>>,
+    /// Points of needles in their frames.
+    tips: Vec<Option<DVec3>>,
     reels: Vec<Handle<Reel>>,
     grips: Vec<Option<Held>>,
     loads: Vec<Option<Acting>>,
@@ -212,9 +216,20 @@ impl Stage {
         if !problems.is_empty() {
             return Err(SceneError { problems });
         }
+        for (k, body) in scene.bodies.iter().enumerate().filter(|(_, b)| b.driven) {
+            world.set_body_motion(bodies[k], BodyMotion::Driven).map_err(|e| at(&body.location, e))?;
+        }
+        for (k, body) in scene.bodies.iter().enumerate() {
+            if let Some(by) = body.held_by {
+                let motion = BodyMotion::Held { by: bodies[by] };
+                world.set_body_motion(bodies[k], motion).map_err(|e| at(&body.location, e))?;
+            }
+        }
         for weld in &scene.welds {
             let places = weld.places.iter().map(|(thread, place)| (threads[*thread], *place)).collect();
-            world.insert_weld(&WeldSpec { places, rest: weld.rest }).map_err(|e| at(&weld.location, e))?;
+            let anchor =
+                weld.anchor.as_ref().map(|a| WeldAnchor { body: bodies[a.body], point: a.point, strength: a.strength });
+            world.insert_weld(&WeldSpec { places, rest: weld.rest, anchor }).map_err(|e| at(&weld.location, e))?;
         }
         let mut reels = Vec::new();
         for reel in &scene.reels {
@@ -232,6 +247,7 @@ impl Stage {
             threads,
             shapes,
             bodies,
+            tips: scene.bodies.iter().map(|b| b.tip).collect(),
             reels,
             grips: vec![None; scene.grips.len()],
             loads: vec![None; scene.loads.len()],
@@ -313,6 +329,15 @@ impl Stage {
             Action::Rest { what } => {
                 self.stop_motion(*what);
                 self.set_way(*what, Way::Posed)
+            }
+            Action::Hold { body, by } => {
+                self.stop_motion(Mover::Body(*body));
+                self.lent.retain(|l| l.what != Mover::Body(*body));
+                self.world.set_body_motion(self.bodies[*body], BodyMotion::Held { by: self.bodies[*by] })
+            }
+            Action::Release { body } => {
+                self.stop_motion(Mover::Body(*body));
+                self.set_way(Mover::Body(*body), Way::Free)
             }
             Action::Push { what, direction, force, speed_limit } => {
                 self.stop_motion(*what);
@@ -464,18 +489,22 @@ impl Stage {
             Mover::Grip(i) => {
                 let Some(held) = self.grips[i] else { return Ok(()) };
                 let drive = match way {
-                    Way::Fixed | Way::Posed => Drive::Pose,
+                    Way::Fixed | Way::Posed | Way::Free => Drive::Pose,
                     Way::Pushed(direction, force, speed_limit) => Drive::Force { direction, force, speed_limit },
                 };
                 self.world.set_grip_drive(held.handle, drive)
             }
             Mover::Shape(i) => {
                 let motion = match way {
-                    Way::Fixed => ShapeMotion::Fixed,
+                    Way::Fixed | Way::Free => ShapeMotion::Fixed,
                     Way::Posed => ShapeMotion::Driven,
                     Way::Pushed(direction, force, speed_limit) => ShapeMotion::Pushed { direction, force, speed_limit },
                 };
                 self.world.set_shape_motion(self.shapes[i], motion)
+            }
+            Mover::Body(i) => {
+                let motion = if way == Way::Posed { BodyMotion::Driven } else { BodyMotion::Free };
+                self.world.set_body_motion(self.bodies[i], motion)
             }
         }
     }
@@ -493,6 +522,11 @@ impl Stage {
                 ShapeMotion::Driven => Way::Posed,
                 ShapeMotion::Pushed { direction, force, speed_limit } => Way::Pushed(direction, force, speed_limit),
                 _ => return None,
+            },
+            Mover::Body(i) => match self.body(i)? {
+                b if b.held_by().is_some() => return None,
+                b if b.is_driven() => Way::Posed,
+                _ => Way::Free,
             },
         })
     }
@@ -520,7 +554,7 @@ impl Stage {
             return Ok(());
         };
         let way = self.lent[k].way;
-        if matches!(way, Way::Pushed(..)) {
+        if matches!(way, Way::Pushed(..) | Way::Free) {
             self.lent.remove(k);
             return self.put_way(what, way);
         }
@@ -545,6 +579,7 @@ impl Stage {
         match what {
             Mover::Grip(i) => self.grips[i].map_or(Ok(()), |held| self.world.set_grip_pose(held.handle, pose)),
             Mover::Shape(i) => self.world.set_shape_pose(self.shapes[i], pose),
+            Mover::Body(i) => self.world.set_body_pose(self.bodies[i], pose),
         }
     }
     /// Takes back a part of the time for which things were last brought back: the step ended early, and that part did
@@ -635,6 +670,7 @@ impl Stage {
         match what {
             Mover::Grip(i) => self.grip_pose(i),
             Mover::Shape(i) => Some(self.shape_pose(i)),
+            Mover::Body(i) => self.body(i).map(|b| b.pose()),
         }
     }
 
@@ -756,6 +792,18 @@ impl Stage {
             Ref::Body(b) => self.body(b).map_or(DVec3::NAN, |b| b.velocity()),
             _ => self.on_thread(r).map_or(DVec3::NAN, |(rod, place)| along(&rod, rod.velocities(), place)),
         }
+    }
+    /// Where the point of a needle is.
+    fn tip(&self, r: Ref) -> DVec3 {
+        let Ref::Body(b) = r else { return DVec3::NAN };
+        self.body(b).zip(self.tips[b]).map_or(DVec3::NAN, |(body, tip)| body.pose().transform_point(tip))
+    }
+    /// What threads pull a body with.
+    fn pull(&self, r: Ref) -> DVec3 {
+        let Ref::Body(b) = r else { return DVec3::NAN };
+        let slot = self.bodies[b].index();
+        let on_it = |w: &sutura::WeldView<'_>| w.body().is_some_and(|(body, _)| body == slot);
+        self.world.view().welds().filter(on_it).map(|w| w.force()).sum()
     }
     fn wrench(&self, r: Ref) -> sutura::Wrench {
         let none = sutura::Wrench { force: DVec3::NAN, torque: DVec3::NAN };
@@ -954,6 +1002,8 @@ impl Live for Stage {
             Read::TwistRate => Value::Number(self.at_joint(args, |r, j| bend(r, j).z)),
             Read::Force => Value::Vector(self.wrench(place).force),
             Read::Torque => Value::Vector(self.wrench(place).torque),
+            Read::Tip => Value::Vector(self.tip(place)),
+            Read::Pull => Value::Vector(self.pull(place)),
             Read::Wrench => {
                 let w = self.wrench(place);
                 Value::Columns(w.force.to_array().into_iter().chain(w.torque.to_array()).collect())
@@ -1005,9 +1055,14 @@ impl Live for Stage {
             Read::Done => Value::Truth(match first {
                 Some(Ref::Grip(g)) => !self.is_moving(Mover::Grip(g)),
                 Some(Ref::Shape(s)) => !self.is_moving(Mover::Shape(s)),
+                Some(Ref::Body(b)) => !self.is_moving(Mover::Body(b)),
                 _ => self.is_done(),
             }),
-            Read::Held => Value::Truth(matches!(first, Some(Ref::Grip(g)) if self.grips[g].is_some())),
+            Read::Held => Value::Truth(match first {
+                Some(Ref::Grip(g)) => self.grips[g].is_some(),
+                Some(Ref::Body(b)) => self.body(b).is_some_and(|b| b.held_by().is_some()),
+                _ => false,
+            }),
             Read::Knot => Value::Text(thread.map_or("unknown".into(), |t| self.knot(t).knot)),
             Read::Determinant => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).determinant as f64)),
             Read::Signature => Value::Number(thread.map_or(f64::NAN, |t| self.knot(t).signature as f64)),

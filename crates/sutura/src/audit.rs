@@ -136,6 +136,20 @@ struct SeenShape {
 struct SeenWeld {
     places: Vec<(usize, f64)>,
     filter_distance: f64,
+    /// The body that it is on, by its slot, and up to which way elements do not touch that.
+    body: Option<(usize, f64)>,
+}
+
+/// Filter distance of a weld, the body that it is on with its filter distance, and its places by thread slot and
+/// particle.
+type Joined = (f64, Option<(usize, f64)>, Vec<(usize, usize)>);
+
+impl SeenWeld {
+    /// The shortest rest arc to it from an element that goes from `from` to `to` on the thread of number `k`.
+    fn way(&self, k: usize, from: f64, to: f64) -> f64 {
+        let ways = self.places.iter().filter(|p| p.0 == k).map(|p| (p.1 - to).max(from - p.1).max(0.0));
+        ways.fold(f64::INFINITY, f64::min)
+    }
 }
 
 /// One thread at one state, as plain slices.
@@ -181,7 +195,7 @@ impl Audit {
             view.time(),
             rods,
             view.shapes(),
-            view.welds().map(|w| (w.filter_distance(), w.places().collect())),
+            view.welds().map(|w| (w.filter_distance(), w.body(), w.places().collect())),
         );
     }
 
@@ -190,7 +204,7 @@ impl Audit {
         time: f64,
         rods: impl Iterator<Item = RodSlice<'a>>,
         shapes: impl Iterator<Item = ShapeView<'a>>,
-        welds: impl Iterator<Item = (f64, Vec<(usize, usize)>)>,
+        welds: impl Iterator<Item = Joined>,
     ) {
         self.report.states += 1;
         core::mem::swap(&mut self.now, &mut self.before);
@@ -248,15 +262,15 @@ impl Audit {
     }
 
     /// Places by thread slot and particle.
-    fn take_welds(&mut self, welds: impl Iterator<Item = (f64, Vec<(usize, usize)>)>) {
+    fn take_welds(&mut self, welds: impl Iterator<Item = Joined>) {
         let Audit { now, arc, welds: seen, .. } = self;
         seen.clear();
-        for (filter_distance, places) in welds {
+        for (filter_distance, body, places) in welds {
             let place = |(slot, particle): (usize, usize)| {
                 let k = now.rods.iter().position(|rod| rod.slot == slot)?;
                 Some((k, arc[now.rods[k].first + particle]))
             };
-            seen.push(SeenWeld { places: places.into_iter().filter_map(place).collect(), filter_distance });
+            seen.push(SeenWeld { places: places.into_iter().filter_map(place).collect(), filter_distance, body });
         }
     }
 
@@ -282,14 +296,9 @@ impl Audit {
 
     fn threads(&mut self, time: f64) {
         let Audit { report, now, before, arc, trees, welds, .. } = self;
-        // The shortest rest arc from an element to a weld, and whether two elements are near each other by way of one.
+        // Whether two elements are near each other by way of a weld.
         let way = |weld: &SeenWeld, k: usize, e: usize| {
-            let (from, to) = (arc[now.rods[k].first + e], arc[now.rods[k].first + e + 1]);
-            weld.places
-                .iter()
-                .filter(|p| p.0 == k)
-                .map(|p| (p.1 - to).max(from - p.1).max(0.0))
-                .fold(f64::INFINITY, f64::min)
+            weld.way(k, arc[now.rods[k].first + e], arc[now.rods[k].first + e + 1])
         };
         let joined = |i: usize, e: usize, k: usize, f: usize| {
             welds.iter().any(|w| way(w, i, e) + way(w, k, f) < w.filter_distance)
@@ -312,7 +321,7 @@ impl Audit {
     }
 
     fn all_shapes<'a>(&mut self, time: f64, shapes: impl Iterator<Item = ShapeView<'a>>) {
-        let Audit { report, now, before, trees, shapes: seen, .. } = self;
+        let Audit { report, now, before, arc, trees, welds, shapes: seen, .. } = self;
         seen.iter_mut().for_each(|s| s.alive = false);
         for shape in shapes {
             let known = seen.iter().position(|s| s.slot == shape.slot && s.is(shape.geometry));
@@ -329,8 +338,13 @@ impl Audit {
             let old_pose = known.map(|_| seen[k].pose);
             seen[k].pose = shape.pose;
             seen[k].alive = true;
-            for (rod, tree) in now.rods.iter().zip(trees.iter()) {
+            for (number, (rod, tree)) in now.rods.iter().zip(trees.iter()).enumerate() {
                 let element = |report: &mut AuditReport, e: usize| {
+                    let (from, to) = (arc[rod.first + e], arc[rod.first + e + 1]);
+                    let holds = |w: &SeenWeld| w.body.filter(|b| Some(b.0) == shape.body).map(|b| b.1);
+                    if welds.iter().any(|w| holds(w).is_some_and(|filter| w.way(number, from, to) < filter)) {
+                        return;
+                    }
                     thread_and_shape(report, time, rod, e, now, before, &seen[k], old_pose);
                 };
                 match &seen[k].bounds {

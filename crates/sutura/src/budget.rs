@@ -182,6 +182,9 @@ impl Budget {
                 Drive::Force { force, .. } | Drive::Hand { force, .. } => force > 0.0,
             };
         }
+        for rod in model.welds.iter().filter(|(_, w)| w.anchor.is_some()).flat_map(|(_, w)| &w.members).map(|m| m.rod) {
+            self.groups[self.of[rod as usize] as usize].driven = true;
+        }
         for (_, reel) in state.reels.iter() {
             self.groups[self.of[reel.rod as usize] as usize].driven = true;
         }

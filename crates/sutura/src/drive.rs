@@ -9,7 +9,8 @@ use crate::motion::Motion;
 use crate::newton::Solver;
 use crate::rod::constraint::{ClampJoint, NodeConstraint};
 use crate::rod::{brake, strain};
-use crate::state::{GripState, State};
+use crate::row::movers::{follow_holder, place_shapes};
+use crate::state::{GripState, Moved, State};
 use crate::view::View;
 use glam::{DQuat, DVec3};
 
@@ -209,19 +210,28 @@ pub(crate) fn predict(
             }
         }
     }
-    rows.welds.predict(model, state, &mut rods.constraint, stage.length());
     move_shapes(model, state, interval, t, stage.length());
+    rows.welds.predict(model, state, &mut rods.constraint, stage.length());
 }
 
-/// Moves driven shapes on to time `t`, by a time `length`.
+/// Moves driven shapes and bodies on to time `t`, by a time `length`, and what they hold with them.
 pub(crate) fn move_shapes(model: &Model, state: &mut State, interval: &Interval<'_>, t: f64, length: f64) {
+    // Rate that reaches the target at the end of the interval; equal to interpolating from its start.
+    let left = interval.start + interval.length - (t - length);
+    let s = if left > length { length / left } else { 1.0 };
     for (slot, shape) in model.shapes.iter() {
         let k = slot as usize;
         if matches!(shape.motion, ShapeMotion::Driven) {
-            // Rate that reaches the target at the end of the interval; equal to interpolating from its start.
-            let left = interval.start + interval.length - (t - length);
-            let s = if left > length { length / left } else { 1.0 };
             state.shape_pose[k] = state.shape_pose[k].interpolate(&state.shape_target[k], s);
         }
     }
+    for slot in 0..model.bodies.len() as u32 {
+        let Some(body) = state.bodies.at_mut(slot) else { continue };
+        if let Moved::Driven { target } = body.motion {
+            let pose = body.pose().interpolate(&target, s);
+            body.place(&pose);
+            place_shapes(model, state, slot);
+        }
+    }
+    (0..model.bodies.len() as u32).for_each(|slot| follow_holder(model, state, slot));
 }

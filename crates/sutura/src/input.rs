@@ -9,14 +9,14 @@
 use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
-use crate::model::body::{Body, BodySpec, ColliderSpec};
+use crate::model::body::{Body, BodyMotion, BodySpec, ColliderSpec};
 use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Closure, RestShape, Rod, RodSpec, Stretch};
 use crate::model::section::{Along, Profile, Section};
 use crate::model::shape::{Geometry, Shape, ShapeMotion, ShapeSpec};
-use crate::model::weld::{Weld, WeldRest, WeldSpec};
+use crate::model::weld::{Weld, WeldAnchor, WeldRest, WeldSpec};
 use crate::params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrder};
 use crate::report::StepReport;
 use crate::snapshot::{Bytes, Reader, damaged, structure, variants};
@@ -78,6 +78,10 @@ pub enum Input {
     InsertBody(BodySpec),
     /// [`World::remove_body`].
     RemoveBody(Handle<Body>),
+    /// [`World::set_body_motion`].
+    BodyMotion(Handle<Body>, BodyMotion),
+    /// [`World::set_body_pose`].
+    BodyPose(Handle<Body>, Pose),
     /// [`World::step`] by a time \[s\], and the state hash that it left.
     Step(f64, u64),
 }
@@ -110,6 +114,8 @@ impl Input {
             Input::Restore(bytes) => world.restore(bytes)?,
             Input::InsertBody(spec) => drop(world.insert_body(spec)?),
             Input::RemoveBody(body) => world.remove_body(*body)?,
+            Input::BodyMotion(body, motion) => world.set_body_motion(*body, *motion)?,
+            Input::BodyPose(body, pose) => world.set_body_pose(*body, *pose)?,
             Input::StepWork(most) => world.set_step_work(*most)?,
             Input::Step(dt, _) => return Ok(Some(world.step(*dt))),
         }
@@ -198,6 +204,10 @@ impl Recorder {
         insert_body(spec: &BodySpec) -> Handle<Body>, Input::InsertBody(spec.clone());
         /// [`World::remove_body`].
         remove_body(body: Handle<Body>) -> (), Input::RemoveBody(body);
+        /// [`World::set_body_motion`].
+        set_body_motion(body: Handle<Body>, motion: BodyMotion) -> (), Input::BodyMotion(body, motion);
+        /// [`World::set_body_pose`].
+        set_body_pose(body: Handle<Body>, pose: Pose) -> (), Input::BodyPose(body, pose);
         /// [`World::set_step_work`].
         set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
@@ -382,6 +392,21 @@ impl Bytes for ShapeSpec {
     }
 }
 
+impl Bytes for WeldSpec {
+    fn put(&self, out: &mut Vec<u8>) {
+        let WeldSpec { places, rest, anchor } = self;
+        places.put(out);
+        rest.put(out);
+        anchor.put(out);
+    }
+    fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
+        let (places, rest) = (Bytes::take(input)?, Bytes::take(input)?);
+        // Versions before 6 know no bodies.
+        let anchor = if input.version < 6 { None } else { Bytes::take(input)? };
+        Ok(WeldSpec { places, rest, anchor })
+    }
+}
+
 /// Tag before the solver of settings that have drag: that follows.
 const DRAG: u8 = 2;
 
@@ -461,7 +486,7 @@ structure!(RodSpec {
 structure!(Closure { twist });
 structure!(ColliderSpec { geometry, pose, density, surface });
 structure!(BodySpec { pose, colliders, velocity, angular_velocity });
-structure!(WeldSpec { places, rest });
+structure!(WeldAnchor { body, point, strength });
 structure!(ReelSpec { rod, at_end, law, supply });
 structure!(GripSpec { rod, place, hold, drive, ramp });
 structure!(LoadSpec { rod, kind });
@@ -470,7 +495,8 @@ variants!(Section { 0 => Round, 1 => Ellipse(axes), 2 => Rectangle(sides) });
 variants!(Solver { 0 => Direct, 1 => Paper(numbers) });
 variants!(SweepOrder { 0 => Natural, 1 => TwoColor });
 variants!(Integrator { 0 => ImplicitEuler, 1 => TrBdf2 });
-variants!(WeldRest { 0 => AsInserted, 1 => Straight });
+variants!(WeldRest { 0 => AsInserted, 1 => Straight, 2 => Loose });
+variants!(BodyMotion { 0 => Free, 1 => Driven, 2 => Held { by } });
 variants!(Stretch { 0 => Elastic, 1 => Inextensible });
 variants!(RestShape { 0 => AsInserted, 1 => Straight, 2 => Given { lengths, darboux } });
 variants!(Geometry {
@@ -509,4 +535,6 @@ variants!(Input {
     23 => StepWork(most),
     24 => InsertBody(spec),
     25 => RemoveBody(body),
+    26 => BodyMotion(body, motion),
+    27 => BodyPose(body, pose),
 });

@@ -20,7 +20,7 @@ use crate::motion::{BodyStart, Motion};
 use crate::params::Integrator;
 use crate::rod::strain;
 use crate::row::movers::{momentum, place_shapes, turned_freely};
-use crate::state::{BodyState, Contact, History, State};
+use crate::state::{BodyState, Contact, History, Moved, State};
 use core::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 use core::ops::Range;
 use glam::DVec3;
@@ -216,8 +216,10 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
         let fall = model.settings.gravity * (stage.span * stage.span);
         let orientation = turned_freely(moments, start.base, start.momentum, stage.span);
         let now = state.bodies.at_mut(slot).expect("living");
-        (now.position, now.orientation) = (start.target + fall, orientation);
-        place_shapes(model, state, slot);
+        if now.motion == Moved::Free {
+            (now.position, now.orientation) = (start.target + fall, orientation);
+            place_shapes(model, state, slot);
+        }
         motion.bodies[slot as usize] = Some(start);
     }
 }

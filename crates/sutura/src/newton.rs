@@ -138,6 +138,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         scale = limit(state, motion, rods, candidates, turn);
         let (slid, built_up) = apply(model, state, rods, rows, scale, true);
         row::shape::predict(rows, &rods.step, scale);
+        rows.welds.predict_forces(&rods.step, &rows.border, scale);
         (out.turn, out.residual) = (turn * scale, shift * scale);
         if waiting && (!trusted || out.turn > SLOW * before || !rows.is_empty()) {
             (waiting, exact) = (false, true);
@@ -244,6 +245,7 @@ fn limit(state: &State, motion: &Motion, rods: &RodScratch, candidates: &Candida
 /// the forces that the step builds up in the rods.
 fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> (f64, f64) {
     let built_up = rods.apply(model, state, scale, anew);
-    rows.welds.apply(state, rows.movers.count(), &rows.border, scale);
-    (rows.movers.apply(model, state, &rows.border, scale), built_up)
+    let slid = rows.movers.apply(model, state, &rows.border, scale);
+    rows.welds.apply(model, state, rows.movers.count(), &rows.border, scale);
+    (slid, built_up)
 }

@@ -12,7 +12,7 @@ use crate::state::State;
 use core::ops::Range;
 use glam::DVec3;
 
-/// Force and torque of each grip on its thread, from what was left unbalanced at its nodes.
+/// Force and torque of each grip on its thread, and of threads on bodies, from what was left unbalanced at their nodes.
 pub(crate) fn reactions(model: &Model, state: &mut State, solver: &mut Solver, h: f64) {
     unbalanced(model, state, solver, h);
     let Solver { rods, rows, .. } = solver;
@@ -22,6 +22,9 @@ pub(crate) fn reactions(model: &Model, state: &mut State, solver: &mut Solver, h
         Some(weld) => weld.members.iter().map(|m| rhs[2 * m.index(model)]).sum(),
         None => rhs[2 * i],
     };
+    for (slot, weld) in model.welds.iter().filter(|(_, w)| w.anchor.is_some()) {
+        state.weld_force[slot as usize] = weld.members.iter().map(|m| rhs[2 * m.index(model)]).sum();
+    }
     let (position, grips) = (&state.position, &mut state.grips);
     for (slot, grip) in grips.iter_mut() {
         let rod = model.rods.at(grip.rod).expect("grips go with their rod");
@@ -69,6 +72,12 @@ fn unbalanced(model: &Model, state: &State, solver: &mut Solver, h: f64) {
                     unbalanced_blocks(model, state, motion, rods, h, rod, i..i + 1);
                 }
             }
+        }
+    }
+    for (_, weld) in model.welds.iter().filter(|(_, w)| w.anchor.is_some()) {
+        for member in &weld.members {
+            let (rod, i) = (model.rods.at(member.rod).expect("welds go with their rods"), member.index(model));
+            unbalanced_blocks(model, state, motion, rods, h, rod, i..i + 1);
         }
     }
     assemble_clamps(state, rods);

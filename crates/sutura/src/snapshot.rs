@@ -9,7 +9,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{BodyState, Contact, Contacts, GripState, History, LoadState, ReelState, Site, State};
+use crate::state::{BodyState, Contact, Contacts, GripState, History, LoadState, Moved, ReelState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
@@ -193,7 +193,8 @@ variants!(LoadKind {
 structure!(Pose { position, orientation });
 structure!(MassProperties { mass, center, moments, axes });
 structure!(LoadState { rod, kind });
-structure!(BodyState { position, orientation, velocity, angular_momentum, acceleration, torque });
+variants!(Moved { 0 => Free, 1 => Driven { target }, 2 => Held { by, at } });
+structure!(BodyState { motion, position, orientation, velocity, angular_momentum, acceleration, torque });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
 structure!(GripState {
     rod,
@@ -217,16 +218,19 @@ macro_rules! state {
     ($($field:ident),* $(,)?) => {
         impl Bytes for State {
             fn put(&self, out: &mut Vec<u8>) {
-                let State { $($field,)* bodies } = self;
+                let State { $($field,)* bodies, weld_force } = self;
                 $($field.put(out);)*
                 let bodies = bodies.values();
                 if !bodies.is_empty() {
                     bodies.put(out);
                     self.contacts.bodies().to_vec().put(out);
+                    weld_force.put(out);
                 }
             }
             fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
-                let mut state = State { $($field: Bytes::take(input)?,)* bodies: Slots::default() };
+                let (bodies, weld_force) = (Slots::default(), Vec::new());
+                let mut state = State { $($field: Bytes::take(input)?,)* bodies, weld_force };
+                state.weld_force.resize(state.weld_orientation.len(), DVec3::ZERO);
                 if !input.left.is_empty() {
                     let bodies = Vec::<Option<BodyState>>::take(input)?;
                     if !matches!(bodies.last(), Some(Some(_))) {
@@ -236,6 +240,7 @@ macro_rules! state {
                     let of_bodies = Vec::<Contact>::take(input)?;
                     let all: Vec<Contact> = state.contacts.iter().copied().chain(of_bodies).collect();
                     state.contacts = sorted(all)?;
+                    state.weld_force = Bytes::take(input)?;
                 }
                 Ok(state)
             }
@@ -470,11 +475,13 @@ pub(crate) fn write(model: &Model, state: &State) -> Vec<u8> {
     out
 }
 
-/// What bodies consist of, each as one number.
+/// What bodies consist of and where threads are attached to them, each as one number.
 pub(crate) fn bodies_of(model: &Model) -> Vec<u64> {
-    let hash = |(_, b): (u32, &BodyModel)| {
+    let hash = |(slot, b): (u32, &BodyModel)| {
         let geometry = |&(shape, pose): &(u32, Pose)| (model.shapes.at(shape).map(|s| s.hash), pose);
-        hash_of(&(b.mass, b.shapes.iter().map(geometry).collect::<Vec<_>>()))
+        let anchors = model.welds.iter().filter_map(|(weld, w)| Some((weld, w.anchor.filter(|a| a.body == slot)?)));
+        let anchors = anchors.map(|(weld, a)| ((weld, a.pose), (a.strength, a.filter_distance)));
+        hash_of(&((b.mass, b.shapes.iter().map(geometry).collect::<Vec<_>>()), anchors.collect::<Vec<_>>()))
     };
     model.bodies.iter().map(hash).collect()
 }

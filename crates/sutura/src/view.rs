@@ -10,7 +10,7 @@ use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::rod::energy::{Energy, energy};
-use crate::state::{BodyState, Site, State};
+use crate::state::{BodyState, Moved, Site, State};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -40,6 +40,8 @@ pub struct ShapeView<'a> {
     pub motion: ShapeMotion,
     /// Its surface for friction.
     pub surface: u32,
+    /// Slot of the body that it is part of ([`BodyView::slot`]), if it is of one.
+    pub body: Option<usize>,
     /// Its slot, unique among living shapes ([`Handle::index`](crate::Handle::index)).
     pub slot: usize,
 }
@@ -48,6 +50,7 @@ pub struct ShapeView<'a> {
 #[derive(Clone, Copy)]
 pub struct WeldView<'a> {
     weld: &'a WeldModel,
+    force: DVec3,
     /// Its point and cross-section, `world_from_weld`.
     pub pose: Pose,
     /// Its slot, unique among living welds ([`Handle::index`](crate::Handle::index)).
@@ -58,6 +61,15 @@ impl<'a> WeldView<'a> {
     /// The places joined: slot of the thread and particle on it.
     pub fn places(&self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         self.weld.members.iter().map(|m| (m.rod as usize, m.particle as usize))
+    }
+    /// The body that it is on, by its slot, and up to which way from the weld elements of its threads do not touch that
+    /// \[m\].
+    pub fn body(&self) -> Option<(usize, f64)> {
+        self.weld.anchor.map(|a| (a.body as usize, a.filter_distance))
+    }
+    /// Force of its threads on the body that it is on \[N\]; zero where it is on none.
+    pub fn force(&self) -> DVec3 {
+        self.force
     }
     /// Elements of the joined threads whose way to each other through the weld is shorter than this do not touch \[m\].
     pub fn filter_distance(&self) -> f64 {
@@ -132,6 +144,7 @@ impl<'a> View<'a> {
             pose: state.shape_pose[slot as usize],
             motion: s.motion,
             surface: s.surface,
+            body: s.body.map(|b| b as usize),
             slot: slot as usize,
         })
     }
@@ -146,7 +159,8 @@ impl<'a> View<'a> {
         let (model, state) = (self.model, self.state);
         model.welds.iter().map(move |(slot, weld)| {
             let position = state.position[weld.members[0].index(model)];
-            WeldView { weld, pose: Pose::new(position, state.weld_orientation[slot as usize]), slot: slot as usize }
+            let k = slot as usize;
+            WeldView { weld, force: state.weld_force[k], pose: Pose::new(position, state.weld_orientation[k]), slot: k }
         })
     }
     /// Contacts that carry force: those of threads with threads, those of threads with shapes, then those of bodies.
@@ -202,6 +216,14 @@ impl<'a> BodyView<'a> {
         let mass = &self.model.mass;
         Pose::new(self.state.position, self.state.orientation).compose(&Pose::new(mass.center, mass.axes).inverse())
     }
+    /// Whether it is driven: nothing else moves it then.
+    pub fn is_driven(&self) -> bool {
+        matches!(self.state.motion, Moved::Driven { .. })
+    }
+    /// Slot of the body that holds it, if one does.
+    pub fn held_by(&self) -> Option<usize> {
+        if let Moved::Held { by, .. } = self.state.motion { Some(by as usize) } else { None }
+    }
     /// Its mass properties.
     pub fn mass(&self) -> MassProperties {
         self.model.mass
@@ -216,8 +238,7 @@ impl<'a> BodyView<'a> {
     }
     /// Angular velocity in world axes \[rad/s\].
     pub fn angular_velocity(&self) -> DVec3 {
-        let q = self.state.orientation;
-        q * ((q.conjugate() * self.state.angular_momentum) / self.model.mass.moments)
+        self.state.spin(self.model.mass.moments)
     }
     /// Linear momentum \[kg m/s\].
     pub fn momentum(&self) -> DVec3 {

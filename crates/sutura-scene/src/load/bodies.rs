@@ -1,8 +1,8 @@
-//! Free bodies.
+//! Bodies and needles.
 
 use super::*;
-use crate::scene::BodyDef;
-use sutura::{BodySpec, ColliderSpec};
+use crate::scene::{AnchorDef, BodyDef, WeldDef};
+use sutura::{BodySpec, ColliderSpec, NEEDLES, NeedlePoint, NeedleShape, NeedleSpec, WeldRest};
 
 /// A solid of a body, and where it stands in the file.
 type Part = (ColliderSpec, Location);
@@ -42,7 +42,133 @@ impl<'d> Loader<'d> {
         }
         let colliders = parts.into_iter().map(|(part, _)| part).collect();
         let spec = BodySpec { pose, colliders, velocity, angular_velocity };
-        self.bodies.push(BodyDef { name, spec, location: table.location() });
+        self.add_body(table, name, spec, None);
+    }
+
+    fn add_body(&mut self, table: &Table<'d>, name: String, spec: BodySpec, tip: Option<DVec3>) {
+        let driven = table.truth_or("driven", false);
+        let held = table.has("held_by");
+        if let Some(value) = table.get("driven").filter(|_| driven && held) {
+            value.problem("`driven` and `held_by` exclude each other", None);
+        }
+        self.bodies.push(BodyDef { name, spec, driven, held_by: None, tip, location: table.location() });
+    }
+
+    /// A needle: a body, and what its thread is swaged into, if there is one.
+    pub(super) fn needle(&mut self, table: &Table<'d>) -> Option<WeldDef> {
+        let name = table
+            .need("name", "the name of the needle")
+            .and_then(|v| v.text())
+            .map_or(format!("body{}", self.bodies.len()), std::borrow::Cow::into_owned);
+        let needle = self.needle_spec(table);
+        let swage = table.get("swage").and_then(|v| self.thread_end(&v));
+        let strength = positive(table, "strength", Dim::FORCE);
+        let pose = match (&swage, &needle) {
+            (Some((thread, place)), Some(needle)) => {
+                for key in ["position", "orientation"] {
+                    if let Some(value) = table.get(key) {
+                        value
+                            .problem(format!("`swage` says where the needle is: `{key}` has no place beside it"), None);
+                    }
+                }
+                let points = &self.threads[*thread].spec.centerline;
+                let n = points.len() - 1;
+                let (at, before) =
+                    if *place == Place::End { (points[n], points[n - 1]) } else { (points[0], points[1]) };
+                let toward = table.need("toward", "the direction in which it bends, such as [0, 0, 1]");
+                let toward = toward.and_then(|v| v.direction()).unwrap_or(DVec3::Z);
+                needle.pose(at, at - before, toward)
+            }
+            _ => pose(table),
+        };
+        // A stand-in for what was reported keeps the numbers of what follows right.
+        let needle =
+            needle.unwrap_or_else(|| NeedleSpec::new(NeedleShape::HalfCircle, 0.017, 5e-4, NeedlePoint::Taper));
+        let spec = match needle.body(pose) {
+            Ok(spec) => spec,
+            Err(e) => {
+                table.problem(e.to_string(), None);
+                BodySpec::solid(Geometry::Sphere { radius: 1.0 }, 1.0, Pose::IDENTITY)
+            }
+        };
+        for (k, part) in spec.colliders.iter().enumerate() {
+            let pose = pose.compose(&part.pose);
+            let (geometry, motion) = (part.geometry.clone(), ShapeMotion::OnBody);
+            let spec = ShapeSpec { geometry, pose, surface: part.surface, motion, open: false };
+            self.shapes.push(ShapeDef { name: format!("{name}.{k}"), spec, location: table.location() });
+        }
+        let body = self.bodies.len();
+        self.add_body(table, name, spec, Some(needle.tip().position));
+        let anchor = Some(AnchorDef { body, point: DVec3::ZERO, strength });
+        swage.map(|place| WeldDef {
+            places: vec![place],
+            rest: WeldRest::AsInserted,
+            anchor,
+            location: table.location(),
+        })
+    }
+
+    /// By its code, or by shape, length, wire and point; each of these overrides the code's.
+    fn needle_spec(&mut self, table: &Table<'d>) -> Option<NeedleSpec> {
+        const SHAPES: [(&str, NeedleShape); 5] = [
+            ("straight", NeedleShape::Straight),
+            ("1/4", NeedleShape::QuarterCircle),
+            ("3/8", NeedleShape::ThreeEighthsCircle),
+            ("1/2", NeedleShape::HalfCircle),
+            ("5/8", NeedleShape::FiveEighthsCircle),
+        ];
+        const POINTS: [(&str, NeedlePoint); 4] = [
+            ("taper", NeedlePoint::Taper),
+            ("cutting", NeedlePoint::Cutting),
+            ("reverse_cutting", NeedlePoint::ReverseCutting),
+            ("blunt", NeedlePoint::Blunt),
+        ];
+        let surface = self.surface(table, 1);
+        let code = match table.get("code") {
+            None => None,
+            Some(value) => {
+                let text = value.text()?;
+                let found = NEEDLES.iter().find(|n| n.code.eq_ignore_ascii_case(text.trim()));
+                if found.is_none() {
+                    let codes = NEEDLES.map(|n| n.code);
+                    value.problem(format!("no needle has the code `{text}`"), suggest(&text, codes));
+                    return None;
+                }
+                found
+            }
+        };
+        let wanted = "a shape (straight, 1/4, 3/8, 1/2 or 5/8), or a `code`";
+        let given = |key: &str, wanted: &str| match (table.get(key), code) {
+            (None, None) => table.need(key, wanted),
+            (value, _) => value,
+        };
+        let shape = given("shape", wanted).map(|v| v.choice(&SHAPES)).unwrap_or(code.map(|c| c.shape));
+        let length = given("length", "the length of the arc, or a `code`")
+            .map(|v| positive_value(&v, Dim::LENGTH))
+            .unwrap_or(code.map(|c| c.length));
+        let wire = given("wire", "the diameter of the wire, or a `code`")
+            .map(|v| positive_value(&v, Dim::LENGTH))
+            .unwrap_or(code.map(|c| c.wire));
+        let point =
+            table.get("point").map(|v| v.choice(&POINTS)).unwrap_or(Some(code.map_or(NeedlePoint::Taper, |c| c.point)));
+        let density = positive(table, "density", Dim::DENSITY);
+        let spec = NeedleSpec::new(shape?, length?, wire?, point?);
+        Some(NeedleSpec { density: density.unwrap_or(spec.density), surface, ..spec })
+    }
+
+    /// An end of a thread, told as `\"thread.end\"`.
+    fn thread_end(&self, value: &Value<'d>) -> Option<(usize, Place)> {
+        let text = value.text()?;
+        let found = text.rsplit_once('.').and_then(|(thread, end)| {
+            let place = [("start", Place::Start), ("end", Place::End)].iter().find(|(name, _)| *name == end)?.1;
+            Some((self.threads.iter().position(|t| t.name == thread)?, place))
+        });
+        if found.is_none() {
+            let all = self.threads.iter().flat_map(|t| ["start", "end"].map(|end| format!("{}.{end}", t.name)));
+            let all = all.collect::<Vec<_>>().join(", ");
+            value.problem(format!("`{text}` is no end of a thread"), Some(format!("ends: {all}")));
+        }
+        found
     }
 
     fn parts(&self, table: &Table<'d>, value: &Value<'d>, density: Option<f64>, surface: u32) -> Option<Vec<Part>> {

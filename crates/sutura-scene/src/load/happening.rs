@@ -79,9 +79,9 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
-        const VERBS: [&str; 13] = [
-            "take", "let_go", "move", "rest", "push", "load", "unload", "mark", "gravity", "solver", "friction",
-            "material", "reel",
+        const VERBS: [&str; 15] = [
+            "take", "let_go", "move", "rest", "push", "hold", "release", "load", "unload", "mark", "gravity", "solver",
+            "friction", "material", "reel",
         ];
         let found: Vec<(&str, Value<'d>)> =
             VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
@@ -96,7 +96,18 @@ impl<'d> Loader<'d> {
             "let_go" => self.find_grip(value).map(|grip| Action::LetGo { grip }),
             "move" => self.find_mover(value).and_then(|what| Some(Action::Move { what, plan: self.plan(table)? })),
             "rest" => self.find_mover(value).map(|what| Action::Rest { what }),
-            "push" => self.find_mover(value).and_then(|what| self.push(table, what)),
+            "push" => self.find_mover(value).and_then(|what| {
+                if matches!(what, Mover::Body(_)) {
+                    value.problem("a body is moved, held or free: it cannot be pushed", None);
+                    return None;
+                }
+                self.push(table, what)
+            }),
+            "hold" => {
+                let by = table.need("by", "the body that holds it").and_then(|v| self.find_body(&v));
+                self.find_body(value).zip(by).map(|(body, by)| Action::Hold { body, by })
+            }
+            "release" => self.find_body(value).map(|body| Action::Release { body }),
             "load" => self.find_load(value).and_then(|load| self.load(table, load)),
             "unload" => self.find_load(value).map(|load| Action::Unload { load }),
             "mark" => self.find_thread(value).map(|thread| Action::Mark { thread }),

@@ -1,7 +1,7 @@
 //! Threads and shapes.
 
 use super::*;
-use crate::scene::Remake;
+use crate::scene::{AnchorDef, Remake};
 
 /// Most elements of all threads together: far beyond what runs in real time, and a slip of the pen must not fill the
 /// memory or cut a centerline for minutes.
@@ -375,10 +375,21 @@ impl<'d> Loader<'d> {
             places.push((thread?, place?));
         }
         let rest = match table.get("rest") {
-            Some(v) => v.choice(&[("as_inserted", WeldRest::AsInserted), ("straight", WeldRest::Straight)])?,
+            Some(v) => v.choice(&[
+                ("as_inserted", WeldRest::AsInserted),
+                ("straight", WeldRest::Straight),
+                ("loose", WeldRest::Loose),
+            ])?,
             None => WeldRest::AsInserted,
         };
-        Some(WeldDef { places, rest, location: table.location() })
+        let anchor = match table.get("body") {
+            None => None,
+            Some(v) => {
+                let point = table.vector("point", Dim::LENGTH).unwrap_or(DVec3::ZERO);
+                Some(AnchorDef { body: self.find_body(&v)?, point, strength: positive(table, "strength", Dim::FORCE) })
+            }
+        };
+        Some(WeldDef { places, rest, anchor, location: table.location() })
     }
 
     /// A reel at an end of a thread.

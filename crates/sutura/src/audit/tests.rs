@@ -33,6 +33,7 @@ impl Scene {
             pose: *pose,
             motion: crate::ShapeMotion::Fixed,
             surface: 0,
+            body: None,
         });
         audit.observe_slices(time, rods, shapes, core::iter::empty());
     }

@@ -5,11 +5,11 @@ pub(crate) mod overlap;
 mod tree;
 
 use crate::lanes::{Vec2, pairs};
-use crate::model::Model;
 use crate::model::body::BodyModel;
 use crate::model::collider::{Collider, Distance};
 use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
+use crate::model::{Model, ShapeModel};
 use crate::motion::Motion;
 use crate::params;
 use crate::rejection::Rejection;
@@ -157,6 +157,48 @@ pub(crate) fn filter_distance(model: &Model, x: &[DVec3], weld: &WeldModel) -> f
     filter_distance
 }
 
+/// Up to which way from a new weld on a body elements of its threads do not touch the body: half a turn of the thread,
+/// or as far as they are in it or at it now.
+pub(crate) fn filter_distance_on_body(model: &Model, state: &State, weld: &WeldModel) -> f64 {
+    let Some(body) = weld.anchor.and_then(|a| model.bodies.at(a.body)) else { return 0.0 };
+    let mut filter_distance = 0.0_f64;
+    for member in &weld.members {
+        let rod = model.rods.at(member.rod).expect("welds go with their rods");
+        let (i, r) = (member.index(model), rod.radius);
+        let touches = |e: usize| {
+            let ends = [state.position[e], state.position[e + 1]];
+            body.shapes.iter().any(|(shape, _)| {
+                let pose = &state.shape_pose[*shape as usize];
+                let collider = &model.shapes.at(*shape).expect("shapes live with their body").collider;
+                collider.segment_distance(ends.map(|p| pose.inverse_transform_point(p)), 1.1 * r).is_some()
+            })
+        };
+        let way = |e: usize| {
+            if e < i {
+                (e + 1..i).map(|k| model.rest_length[k]).sum()
+            } else {
+                (i..e).map(|k| model.rest_length[k]).sum::<f64>()
+            }
+        };
+        let mut filter = core::f64::consts::PI * r;
+        let (before, after) = ((rod.elements().start..i).rev(), i..rod.elements().end);
+        for e in before.take_while(|e| touches(*e)).chain(after.take_while(|e| touches(*e))) {
+            filter = filter.max(way(e) + 0.01 * r);
+        }
+        filter_distance = filter_distance.max(filter);
+    }
+    filter_distance
+}
+
+/// Whether an element is held by the body that a shape is part of, so near that they do not touch.
+fn attached(model: &Model, arc: &[f64], shape: &ShapeModel, e: usize) -> bool {
+    shape.body.is_some_and(|body| {
+        model.welds.iter().any(|(_, weld)| {
+            weld.anchor.is_some_and(|a| a.body == body && way_to_weld(model, arc, weld, e) < a.filter_distance)
+        })
+    })
+}
+
 /// Rest arc of each particle from the start of its rod.
 fn arcs(model: &Model, arc: &mut Vec<f64>) {
     arc.resize(model.mass.len(), 0.0);
@@ -214,7 +256,7 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
         shape_bounds.push((lo, hi));
         // A plane's box is everything: it overlaps the empty leaves as well.
         tree.overlapping(&Bounds { lo, hi }, |e| {
-            if e < model.mass.len() && model.is_element(e) {
+            if e < model.mass.len() && model.is_element(e) && !attached(model, arc, shape, e) {
                 shapes.push((slot, e as u32));
             }
         });
@@ -230,8 +272,10 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
             let size =
                 [a, b].iter().filter_map(|s| model.body_of(*s)).map(BodyModel::size).fold(f64::INFINITY, f64::min);
             let room = DVec3::splat(params::MARGIN * size);
-            let near = size.is_finite() && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
-            if near && first.body != second.body {
+            let moves = [first, second].iter().any(|s| s.body.is_some_and(|b| state.gives_way(b)));
+            let near = moves && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
+            let root = |s: &ShapeModel| s.body.map(|b| state.root_of(b));
+            if near && root(first) != root(second) {
                 solids.push((a, b));
             }
         }

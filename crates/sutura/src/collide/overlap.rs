@@ -8,7 +8,7 @@
 //! than `PRESSED`.
 
 use super::tree::{Bounds, Tree};
-use super::{arcs, neighbors, turning};
+use super::{arcs, attached, neighbors, turning};
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::collider::Collider;
@@ -197,7 +197,7 @@ impl Seen<'_> {
             // A plane's box is everything: it overlaps the empty leaves as well.
             tree.overlapping(&Bounds { lo, hi }, |e| elements.extend((e < n).then_some(e)));
         }
-        elements.retain(|e| model.is_element(*e));
+        elements.retain(|e| model.is_element(*e) && !attached(model, &self.arc, shape, *e));
         elements.sort_unstable();
         let mut hits: Vec<Hit> = Vec::new();
         // Whether the start of the next element is in the solid, while that is known.

@@ -23,6 +23,21 @@ pub struct BodySpec {
     pub angular_velocity: DVec3,
 }
 
+/// What moves a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum BodyMotion {
+    /// Gravity, contact, and what is attached to it.
+    Free,
+    /// It goes where it is told ([`World::set_body_pose`](crate::World::set_body_pose)), whatever that takes.
+    Driven,
+    /// Another body holds it, rigidly: both are one, with the mass of both.
+    Held {
+        /// The one that holds it, which is free or driven.
+        by: crate::Handle<Body>,
+    },
+}
+
 /// A solid that is part of a body. Where two of one body overlap both have mass.
 #[derive(Debug, Clone)]
 pub struct ColliderSpec {

@@ -5,6 +5,7 @@ pub(crate) mod collider;
 pub mod grip;
 pub mod material;
 pub mod mesh;
+pub mod needle;
 pub mod reel;
 pub mod rod;
 pub mod section;

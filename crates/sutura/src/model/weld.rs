@@ -1,11 +1,14 @@
-//! Places of threads that are joined: a ring closed, a branch, a splice.
+//! Places of threads that are joined with each other or with a body: a ring closed, a branch, a splice, a needle.
 
 use crate::error::Error;
+use crate::error::check;
 use crate::handle::Handle;
+use crate::math::Pose;
 use crate::model::Model;
+use crate::model::body::Body;
 use crate::model::grip::Place;
 use crate::model::rod::Rod;
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 
 /// A weld. Marker of [`Handle`].
 #[derive(Debug)]
@@ -15,11 +18,24 @@ pub enum Weld {}
 /// clamp does, with half an element of its own compliance on each side.
 #[derive(Debug, Clone)]
 pub struct WeldSpec {
-    /// The places, at least two; ends or inner particles, no place twice. They lie within a tenth of the smallest
-    /// radius of each other.
+    /// The places, at least two, or one on a body; ends or inner particles, no place twice. They lie within a tenth of
+    /// the smallest radius of each other.
     pub places: Vec<(Handle<Rod>, Place)>,
     /// Shape of the joint when nothing acts on it.
     pub rest: WeldRest,
+    /// The body that they are joined to, if any.
+    pub anchor: Option<WeldAnchor>,
+}
+
+/// Where a body holds threads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeldAnchor {
+    /// The body.
+    pub body: Handle<Body>,
+    /// Where on it, in its own frame \[m\]: not farther from the places than a tenth of a radius.
+    pub point: DVec3,
+    /// Pull on the body at which the threads come off \[N\], > 0; `None` where they never do.
+    pub strength: Option<f64>,
 }
 
 /// Shape of a weld at rest.
@@ -31,13 +47,29 @@ pub enum WeldRest {
     /// Two ends that go on straight into each other, without moment where their directions agree; turned about their
     /// direction as they are now.
     Straight,
+    /// They are joined at a point and turn about it freely, as on a ball; of places on a body only. A thread that goes
+    /// on through the point keeps its own joint there.
+    Loose,
 }
 
 /// A weld, checked.
 #[derive(Debug, Clone)]
 pub(crate) struct WeldModel {
     pub members: Vec<Member>,
+    /// Where it is on a body, if it is on one.
+    pub anchor: Option<Anchor>,
     /// Elements of joined threads that are nearer to each other by way of the weld than this do not touch \[m\].
+    pub filter_distance: f64,
+}
+
+/// Where a weld is on a body, in that one's principal frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Anchor {
+    pub body: u32,
+    pub pose: Pose,
+    /// Force on the body from which on the threads come off \[N\].
+    pub strength: f64,
+    /// Elements that are nearer to it along their thread than this do not touch the body \[m\].
     pub filter_distance: f64,
 }
 
@@ -73,6 +105,10 @@ pub(crate) struct Half {
 }
 
 impl WeldModel {
+    /// Whether it joins anything.
+    pub fn joins(&self) -> bool {
+        self.members.len() + usize::from(self.anchor.is_some()) >= 2
+    }
     /// Its half joints, member by member.
     pub fn halves<'a>(&'a self, model: &'a Model) -> impl Iterator<Item = Half> + 'a {
         self.members.iter().flat_map(|m| m.halves(model))
@@ -105,20 +141,42 @@ impl Side {
 impl WeldSpec {
     /// Joins ends or inner particles as they lie.
     pub fn new(places: Vec<(Handle<Rod>, Place)>) -> Self {
-        WeldSpec { places, rest: WeldRest::AsInserted }
+        WeldSpec { places, rest: WeldRest::AsInserted, anchor: None }
     }
     /// Splices two ends so that they go on straight into each other.
     pub fn splice(a: (Handle<Rod>, Place), b: (Handle<Rod>, Place)) -> Self {
-        WeldSpec { places: vec![a, b], rest: WeldRest::Straight }
+        WeldSpec { places: vec![a, b], rest: WeldRest::Straight, anchor: None }
+    }
+    /// Attaches a place of a thread to a body, at a point of the body's frame, with its direction as it is now.
+    pub fn to_body(place: (Handle<Rod>, Place), body: Handle<Body>, point: DVec3) -> Self {
+        let anchor = Some(WeldAnchor { body, point, strength: None });
+        WeldSpec { places: vec![place], rest: WeldRest::AsInserted, anchor }
     }
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
-        if self.places.len() < 2 || self.rest == WeldRest::Straight && self.places.len() != 2 {
+        let on_body = self.anchor.is_some();
+        match (on_body, self.rest) {
+            (true, WeldRest::Straight) => {
+                return Err(Error::invalid("weld", "rest", self.rest, "as inserted or loose, on a body"));
+            }
+            (false, WeldRest::Loose) => return Err(Error::invalid("weld", "rest", self.rest, "loose on a body only")),
+            _ => {}
+        }
+        if let Some(anchor) = &self.anchor {
+            if let Some(strength) = anchor.strength {
+                check("weld", "strength", strength, strength > 0.0, "a force > 0 [N]")?;
+            }
+            if !anchor.point.is_finite() {
+                return Err(Error::invalid("weld", "point", anchor.point, "a finite place"));
+            }
+        }
+        let least = if on_body { 1 } else { 2 };
+        if self.places.len() < least || self.rest == WeldRest::Straight && self.places.len() != 2 {
             return Err(Error::invalid(
                 "weld",
                 "places",
                 self.places.len(),
-                "at least two places; two where they go on straight",
+                "at least two places, or one on a body; two where they go on straight",
             ));
         }
         Ok(())

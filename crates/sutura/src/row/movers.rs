@@ -12,13 +12,13 @@
 //! its angular momentum keeps to L = L0 + h tau: momentum is kept exactly, and a free top is of second order in h.
 //! The matrix has R_m I R_m^T / h^2, which leaves out a part of the order h |Omega|.
 
-use crate::math::{Pose, exp, log, skew};
+use crate::math::{exp, log, skew};
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
 use crate::motion::Motion;
 use crate::row::border::Border;
 use crate::row::side::Moves;
-use crate::state::{BodyState, State};
+use crate::state::{BodyState, Moved, State};
 use glam::{DMat3, DQuat, DVec3};
 
 /// A shape on a line.
@@ -27,13 +27,24 @@ struct Slider {
     direction: DVec3,
 }
 
+/// A body that contact can move, by unknowns of its own or with the one that holds it.
+struct Mover {
+    slot: u32,
+    /// First of the unknowns, the body that has them, and where that has its center of mass at the iterate.
+    first: usize,
+    root: u32,
+    center: DVec3,
+}
+
 /// What may move in the substep. Unknowns are those of the sliders, then those of the bodies.
 #[derive(Default)]
 pub(crate) struct Movers {
     sliders: Vec<Slider>,
-    /// Slots of the living bodies, and their centers of mass at the iterate.
-    bodies: Vec<(u32, DVec3)>,
-    /// Body of each shape, counted here, by its slot.
+    bodies: Vec<Mover>,
+    /// Number of bodies with unknowns of their own.
+    roots: usize,
+    /// What moves each body, counted here, by its slot, and the body of each shape.
+    mover_of: Vec<Option<u32>>,
     body_of: Vec<Option<u32>>,
     /// Length of the solve \[s\].
     h: f64,
@@ -74,10 +85,32 @@ pub(crate) fn momentum(moments: DVec3, base: DQuat, body: &BodyState, span: f64)
 /// Puts the shapes of a body where it is.
 pub(crate) fn place_shapes(model: &Model, state: &mut State, slot: u32) {
     let (Some(model), Some(body)) = (model.bodies.at(slot), state.bodies.at(slot)) else { return };
-    let pose = Pose::new(body.position, body.orientation);
+    let pose = body.pose();
     for (shape, local) in &model.shapes {
         state.shape_pose[*shape as usize] = pose.compose(local);
     }
+}
+
+/// Puts a body that another one holds, and its shapes, where that is.
+pub(crate) fn follow_holder(model: &Model, state: &mut State, slot: u32) {
+    if let Some(Moved::Held { by, at }) = state.bodies.at(slot).map(|b| b.motion)
+        && let Some(pose) = state.bodies.at(by).map(|b| b.pose().compose(&at))
+    {
+        state.bodies.at_mut(slot).expect("just read").place(&pose);
+        place_shapes(model, state, slot);
+    }
+}
+
+/// How a point that is `arm` from the center of what moves it goes with each of six unknowns: a turn phi moves it by
+/// phi x arm.
+pub(crate) fn six_columns(arm: DVec3) -> [DVec3; 6] {
+    let turns = -skew(arm);
+    [DVec3::X, DVec3::Y, DVec3::Z, turns.col(0), turns.col(1), turns.col(2)]
+}
+
+/// Last steps of three unknowns.
+fn steps(border: &Border, first: usize) -> DVec3 {
+    DVec3::new(border.step(first), border.step(first + 1), border.step(first + 2))
 }
 
 impl Movers {
@@ -86,6 +119,8 @@ impl Movers {
         self.sliders.clear();
         self.bodies.clear();
         self.body_of.clear();
+        self.mover_of.clear();
+        self.roots = 0;
         self.h = h;
         for (slot, shape) in model.shapes.iter() {
             if let ShapeMotion::Pushed { direction, force, .. } = shape.motion
@@ -98,18 +133,34 @@ impl Movers {
             return;
         }
         self.body_of.resize(model.shapes.len(), None);
-        for (slot, body) in model.bodies.iter() {
-            let number = self.bodies.len() as u32;
-            self.bodies.push((slot, state.bodies.at(slot).map_or(DVec3::ZERO, |b| b.position)));
-            for (shape, _) in &body.shapes {
-                self.body_of[*shape as usize] = Some(number);
+        self.mover_of.resize(model.bodies.len(), None);
+        // Those that hold come before those that are held.
+        for held in [false, true] {
+            for (slot, body) in model.bodies.iter() {
+                let root = state.root_of(slot);
+                if (root != slot) != held || !state.gives_way(slot) {
+                    continue;
+                }
+                let number = self.bodies.len() as u32;
+                let first = if held {
+                    self.mover_of[root as usize].map_or(0, |m| self.bodies[m as usize].first)
+                } else {
+                    self.roots += 1;
+                    self.sliders.len() + SIX * (self.roots - 1)
+                };
+                let center = state.bodies.at(root).map_or(DVec3::ZERO, |b| b.position);
+                self.bodies.push(Mover { slot, first, root, center });
+                self.mover_of[slot as usize] = Some(number);
+                for (shape, _) in &body.shapes {
+                    self.body_of[*shape as usize] = Some(number);
+                }
             }
         }
     }
 
     /// Number of unknowns.
     pub fn count(&self) -> usize {
-        self.sliders.len() + SIX * self.bodies.len()
+        self.sliders.len() + SIX * self.roots
     }
 
     pub fn has_bodies(&self) -> bool {
@@ -131,16 +182,29 @@ impl Movers {
             border.push(k, force - damper * moved);
         }
         let span = motion.span;
-        for (number, (slot, center)) in self.bodies.iter_mut().enumerate() {
-            let first = self.sliders.len() + SIX * number;
+        for Mover { slot, first, root, center } in &mut self.bodies {
+            let first = *first;
             let (Some(body), Some(start)) = (state.bodies.at(*slot), motion.bodies[*slot as usize]) else { continue };
             let mass = &model.bodies.at(*slot).expect("listed").mass;
-            *center = body.position;
+            *center = state.bodies.at(*root).map_or(body.position, |b| b.position);
+            let arm = body.position - *center;
             let w = mass.mass * motion.heavier[0] / (span * span);
             let force = model.settings.gravity * mass.mass + (start.target - body.position) * w;
             let (inertia, momentum) = rotation(mass.moments, start.base, body.orientation, span);
             let over = motion.heavier[1] / (span * span);
-            let torque = (start.momentum - momentum) * (motion.heavier[1] / span);
+            let mut torque = (start.momentum - momentum) * (motion.heavier[1] / span);
+            if root != slot {
+                torque += arm.cross(force);
+                let across = skew(arm) * w;
+                let about = -(skew(arm) * across);
+                for i in 0..3 {
+                    for j in 0..3 {
+                        border.add_own(first + 3 + i, first + j, across.col(j)[i]);
+                        border.add_own(first + j, first + 3 + i, across.col(j)[i]);
+                        border.add_own(first + 3 + i, first + 3 + j, about.col(j)[i]);
+                    }
+                }
+            }
             for i in 0..3 {
                 border.add_own(first + i, first + i, w);
                 border.push(first + i, force[i]);
@@ -155,11 +219,8 @@ impl Movers {
     /// How the material of a shape that is at `point` moves with its unknowns; none where nothing moves the shape.
     pub fn moves(&self, shape: u32, point: DVec3) -> Option<Moves> {
         if let Some(number) = self.body_of.get(shape as usize).copied().flatten() {
-            let arm = point - self.bodies[number as usize].1;
-            // A turn phi moves it by phi x arm.
-            let turns = -skew(arm);
-            let columns = [DVec3::X, DVec3::Y, DVec3::Z, turns.col(0), turns.col(1), turns.col(2)];
-            return Some(Moves::new(self.sliders.len() + SIX * number as usize, &columns));
+            let Mover { first, center, .. } = self.bodies[number as usize];
+            return Some(Moves::new(first, &six_columns(point - center)));
         }
         let k = self.sliders.iter().position(|s| s.shape == shape)?;
         Some(Moves::new(k, &[self.sliders[k].direction]))
@@ -172,21 +233,15 @@ impl Movers {
 
     /// Greatest turn of a body in the last step \[rad\], squared.
     pub fn turn_squared(&self, border: &Border) -> f64 {
-        let turn = |number: usize| {
-            let first = self.sliders.len() + SIX * number + 3;
-            DVec3::new(border.step(first), border.step(first + 1), border.step(first + 2)).length_squared()
-        };
-        (0..self.bodies.len()).map(turn).fold(0.0, crate::math::max_or_nan)
+        let turn = |number: usize| steps(border, self.sliders.len() + SIX * number + 3).length_squared();
+        (0..self.roots).map(turn).fold(0.0, crate::math::max_or_nan)
     }
 
     /// Greatest move of a body in the last step, in hundredths of its size.
     pub fn largest_move(&self, model: &Model, border: &Border) -> f64 {
-        let moved = |(number, (slot, _)): (usize, &(u32, DVec3))| {
-            let first = self.sliders.len() + SIX * number;
-            let step = DVec3::new(border.step(first), border.step(first + 1), border.step(first + 2));
-            step.length() / (0.01 * model.bodies.at(*slot).expect("listed").size())
-        };
-        self.bodies.iter().enumerate().map(moved).fold(0.0, crate::math::max_or_nan)
+        let moved =
+            |m: &Mover| steps(border, m.first).length() / (0.01 * model.bodies.at(m.slot).expect("listed").size());
+        self.bodies[..self.roots].iter().map(moved).fold(0.0, crate::math::max_or_nan)
     }
 
     /// Takes their part of the step; the largest move of a pushed shape \[m\].
@@ -197,15 +252,20 @@ impl Movers {
             state.shape_pose[s.shape as usize].position += s.direction * step;
             far = far.max(step.abs());
         }
-        for (number, (slot, _)) in self.bodies.iter().enumerate() {
-            let first = self.sliders.len() + SIX * number;
-            let vector = |k: usize| DVec3::new(border.step(k), border.step(k + 1), border.step(k + 2)) * scale;
+        for Mover { slot, first, .. } in &self.bodies[..self.roots] {
             let body = state.bodies.at_mut(*slot).expect("listed");
-            body.position += vector(first);
-            body.orientation = (exp(vector(first + 3)) * body.orientation).normalize();
+            body.position += steps(border, *first) * scale;
+            body.orientation = (exp(steps(border, first + 3) * scale) * body.orientation).normalize();
             place_shapes(model, state, *slot);
         }
+        self.bodies[self.roots..].iter().for_each(|m| follow_holder(model, state, m.slot));
         far
+    }
+
+    /// First of the six unknowns that move a body, and the center about which they turn it; none where nothing can.
+    pub fn unknowns_of(&self, body: u32) -> Option<(usize, DVec3)> {
+        let Mover { first, center, .. } = self.bodies[self.mover_of.get(body as usize).copied().flatten()? as usize];
+        Some((first, center))
     }
 
     /// Adds a contact of a shape with the element `e`, at a point of its surface: stiffness, force on the thread and

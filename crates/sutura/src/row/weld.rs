@@ -6,15 +6,18 @@
 //! The cross-section has no inertia; each frame beside it is tied to it by half a joint, as to a clamp, so that two
 //! ends welded are one thread to second order in the element length.
 
-use crate::math::{exp, skew};
+use crate::math::{exp, outer, skew};
 use crate::model::Model;
+use crate::model::weld::Anchor;
 use crate::rod::assemble::clamp_terms;
 use crate::rod::constraint::{ClampJoint, NodeConstraint};
 use crate::rod::half_angle;
 use crate::rod::scratch::RodScratch;
 use crate::row::Rows;
 use crate::row::border::Border;
+use crate::row::movers::{Movers, six_columns};
 use crate::state::State;
+use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
 
 /// The welds of the substep in slot order. Their unknowns follow those of the pushed shapes.
@@ -22,14 +25,53 @@ use glam::{DMat3, DQuat, DVec3};
 pub(crate) struct Welds {
     welds: Vec<Active>,
     joints: Vec<Joint>,
+    /// Couplings of nodes with the places of the welds, weld by weld.
     links: Vec<(usize, DMat3)>,
+    /// Number of those with unknowns of their own.
+    own: usize,
 }
 
 struct Active {
     slot: u32,
+    /// Its number among those that have unknowns of their own, or where it is on a body.
+    at: Carrier,
+    unknowns: Unknowns,
+    /// Stiffness at its place, what its particles lack for balance, and their couplings, as last assembled.
+    own: DMat3,
+    right: DVec3,
+    links: Range<usize>,
+    /// Force of its threads on the body that it is on, as the last step predicted it.
+    force: DVec3,
     /// What may move of its place, and of its turning.
     place: NodeConstraint,
     turning: NodeConstraint,
+}
+
+#[derive(Clone, Copy)]
+enum Carrier {
+    Own(usize),
+    Body(Anchor),
+}
+
+/// The unknowns of the border that move the place of a weld and turn its cross-section, at the iterate: each with what
+/// a unit of it does.
+#[derive(Clone, Copy, Default)]
+struct Unknowns {
+    place: [(usize, DVec3); SIX],
+    n_place: usize,
+    turning: [(usize, DVec3); 3],
+    n_turning: usize,
+    /// From the center of the body that it is on to its place.
+    arm: DVec3,
+}
+
+impl Unknowns {
+    fn place(&self) -> &[(usize, DVec3)] {
+        &self.place[..self.n_place]
+    }
+    fn turning(&self) -> &[(usize, DVec3)] {
+        &self.turning[..self.n_turning]
+    }
 }
 
 /// Half a joint between a weld and a frame, as last assembled.
@@ -48,7 +90,7 @@ const SIX: usize = 6;
 
 impl Welds {
     pub fn count(&self) -> usize {
-        SIX * self.welds.len()
+        SIX * self.own
     }
 
     /// Lists welds and half joints at the start of a solve of length `h`, before anything has moved. Damping acts over
@@ -56,9 +98,28 @@ impl Welds {
     pub fn begin(&mut self, model: &Model, state: &State, joint_on: &mut [bool], h: f64) {
         self.welds.clear();
         self.joints.clear();
+        self.own = 0;
         for (slot, weld) in model.welds.iter() {
             let k = self.welds.len();
-            self.welds.push(Active { slot, place: NodeConstraint::Free, turning: NodeConstraint::Free });
+            let at = match weld.anchor {
+                Some(anchor) => Carrier::Body(anchor),
+                None => {
+                    self.own += 1;
+                    Carrier::Own(self.own - 1)
+                }
+            };
+            let (place, turning) = (NodeConstraint::Free, NodeConstraint::Free);
+            self.welds.push(Active {
+                slot,
+                at,
+                unknowns: Unknowns::default(),
+                own: DMat3::ZERO,
+                right: DVec3::ZERO,
+                links: 0..0,
+                force: state.weld_force[slot as usize],
+                place,
+                turning,
+            });
             let orientation = state.weld_orientation[slot as usize];
             for member in &weld.members {
                 if member.before.is_some() && member.after.is_some() {
@@ -98,6 +159,11 @@ impl Welds {
     pub fn predict(&mut self, model: &Model, state: &mut State, constraint: &mut [NodeConstraint], h: f64) {
         for (k, w) in self.welds.iter_mut().enumerate() {
             let members = &model.welds.at(w.slot).expect("living").members;
+            if let Carrier::Body(anchor) = w.at {
+                members.iter().for_each(|m| constraint[2 * m.index(model)] = NodeConstraint::Held);
+                go_with_body(model, state, w.slot, &anchor);
+                continue;
+            }
             let held = members.iter().map(|m| m.index(model)).find(|i| constraint[2 * i] != NodeConstraint::Free);
             let from = held.unwrap_or_else(|| members[0].index(model));
             w.place = constraint[2 * from];
@@ -137,50 +203,124 @@ impl Welds {
 
     /// Greatest turn of the last step \[rad\], squared.
     pub fn turn_squared(&self, first: usize, border: &Border) -> f64 {
-        (0..self.welds.len())
+        (0..self.own)
             .map(|k| vector(border, first + SIX * k + 3).length_squared())
             .fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
-    /// Turns the cross-sections by their part of the step. (Their particles are moved with the others.)
-    pub fn apply(&self, state: &mut State, first: usize, border: &Border, scale: f64) {
-        for (k, w) in self.welds.iter().enumerate() {
-            let q = &mut state.weld_orientation[w.slot as usize];
-            *q = (exp(vector(border, first + SIX * k + 3) * scale) * *q).normalize();
+    /// Turns the cross-sections by their part of the step (their particles are moved with the others), and puts those on
+    /// bodies where these are now.
+    pub fn apply(&self, model: &Model, state: &mut State, first: usize, border: &Border, scale: f64) {
+        for w in &self.welds {
+            match w.at {
+                Carrier::Own(k) => {
+                    let q = &mut state.weld_orientation[w.slot as usize];
+                    *q = (exp(vector(border, first + SIX * k + 3) * scale) * *q).normalize();
+                }
+                Carrier::Body(anchor) => go_with_body(model, state, w.slot, &anchor),
+            }
         }
     }
+
+    /// Notes the forces on bodies that a step of this length predicts.
+    pub fn predict_forces(&mut self, step: &[DVec3], border: &Border, scale: f64) {
+        for w in self.welds.iter_mut().filter(|w| w.unknowns.n_place == SIX) {
+            let moved: DVec3 = w.unknowns.place().iter().map(|(j, v)| *v * border.step(*j)).sum();
+            let pull = self.links[w.links.clone()].iter().map(|(node, m)| m.transpose() * step[*node]);
+            w.force = w.right - (w.own * moved + pull.sum::<DVec3>()) * scale;
+        }
+    }
+
+    /// Finds the unknowns of each weld at the iterate.
+    fn find_unknowns(&mut self, state: &State, movers: &Movers) {
+        let after = movers.count();
+        for w in &mut self.welds {
+            let u = &mut w.unknowns;
+            match w.at {
+                Carrier::Own(k) => {
+                    let base = after + SIX * k;
+                    let (place, turning) = (w.place.projector(), w.turning.projector());
+                    (u.n_place, u.n_turning) = (3, 3);
+                    for c in 0..3 {
+                        u.place[c] = (base + c, place.col(c));
+                        u.turning[c] = (base + 3 + c, turning.col(c));
+                    }
+                }
+                Carrier::Body(anchor) => {
+                    (u.n_place, u.n_turning) = (0, 0);
+                    let at = state.bodies.at(anchor.body).map(|b| b.pose().transform_point(anchor.pose.position));
+                    if let (Some((first, center)), Some(at)) = (movers.unknowns_of(anchor.body), at) {
+                        (u.n_place, u.n_turning, u.arm) = (SIX, 3, at - center);
+                        for (c, column) in six_columns(u.arm).into_iter().enumerate() {
+                            u.place[c] = (first + c, column);
+                        }
+                        for (c, axis) in DVec3::AXES.into_iter().enumerate() {
+                            u.turning[c] = (first + 3 + c, axis);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Puts the particles of a weld on a body, and its cross-section, where the body is.
+fn go_with_body(model: &Model, state: &mut State, slot: u32, anchor: &Anchor) {
+    let Some(pose) = state.bodies.at(anchor.body).map(|b| b.pose().compose(&anchor.pose)) else { return };
+    for member in &model.welds.at(slot).expect("living").members {
+        state.position[member.index(model)] = pose.position;
+    }
+    state.weld_orientation[slot as usize] = pose.orientation;
+}
+
+/// Stiffness against turning of a force that acts at the end of an arm and keeps its direction: `(a . f) I - (a f^T + f
+/// a^T) / 2`, or of that what is positive.
+fn of_arm(arm: DVec3, force: DVec3, exact: bool) -> DMat3 {
+    let along = arm.dot(force);
+    if exact {
+        return DMat3::IDENTITY * along - (outer(arm, force) + outer(force, arm)) * 0.5;
+    }
+    // Eigenvectors: across both, and between them; along the sum of their directions it is negative.
+    let (Some(a), Some(f)) = (arm.try_normalize(), force.try_normalize()) else { return DMat3::ZERO };
+    let across = a.cross(f).try_normalize().unwrap_or_else(|| a.any_orthonormal_vector());
+    let between = (a - f).try_normalize().filter(|_| a.dot(f) < 0.99).unwrap_or_else(|| across.cross(a));
+    outer(across, across) * along.max(0.0) + outer(between, between) * (0.5 * (along + arm.length() * force.length()))
 }
 
 fn vector(border: &Border, k: usize) -> DVec3 {
     DVec3::new(border.step(k), border.step(k + 1), border.step(k + 2))
 }
 
-/// Makes the rows of welded particles those of the weld: the rods are assembled, nothing is taken out yet.
+/// Makes the rows of welded particles those of the weld, or of the body that it is on: the rods are assembled, nothing
+/// is taken out yet.
 pub(crate) fn gather(model: &Model, state: &State, rods: &mut RodScratch, rows: &mut Rows, exact: bool) {
     let RodScratch { system, rhs, .. } = rods;
     let Rows { welds, border, movers, .. } = rows;
-    let first = movers.count();
-    let Welds { welds, joints, links } = welds;
-    // A pushed shape that touches an element beside a weld couples with the weld.
-    for k in 0..first {
+    if welds.welds.is_empty() {
+        return;
+    }
+    welds.find_unknowns(state, movers);
+    let Welds { welds, joints, links, .. } = welds;
+    links.clear();
+    // What moves and touches an element beside a weld couples with the weld.
+    for k in 0..movers.count() {
         let mut found = core::mem::take(border.links_mut(k));
         found.retain(|(node, v)| {
             let Some(w) = weld_of_node(model, welds, *node) else { return true };
-            let v = welds[w].place.projector() * *v;
-            for c in 0..3 {
-                let to = first + SIX * w + c;
-                border.add_own(k, to, v[c]);
-                border.add_own(to, k, v[c]);
+            for (to, column) in welds[w].unknowns.place() {
+                border.add_own(k, *to, column.dot(*v));
+                border.add_own(*to, k, column.dot(*v));
             }
             false
         });
         *border.links_mut(k) = found;
     }
     for k in 0..welds.len() {
-        let base = first + SIX * k;
-        links.clear();
+        let weld = &welds[k];
+        let members = &model.welds.at(weld.slot).expect("living").members;
+        let from = links.len();
         let (mut own, mut right) = (DMat3::ZERO, DVec3::ZERO);
-        for member in &model.welds.at(welds[k].slot).expect("living").members {
+        for member in members {
             let i = member.index(model);
             let n = 2 * i;
             let rod = model.rods.at(member.rod).expect("welds go with their rods");
@@ -196,41 +336,54 @@ pub(crate) fn gather(model: &Model, state: &State, rods: &mut RodScratch, rows: 
             }
             rhs[n] = DVec3::ZERO;
         }
-        let place = welds[k].place;
-        let i = model.welds.at(welds[k].slot).expect("living").members[0].index(model);
-        if let Some((stiffness, force)) = place.drive(state.position[i]) {
+        if let Some((stiffness, force)) = weld.place.drive(state.position[members[0].index(model)]) {
             own += stiffness;
             right += force;
         }
-        let keep = place.projector();
-        for (node, m) in links.iter() {
-            let m = *m * keep;
+        let place = weld.unknowns.place();
+        for (node, m) in &links[from..] {
             match weld_of_node(model, welds, *node) {
-                Some(other) => add_block(border, first + SIX * other, base, &(welds[other].place.projector() * m)),
-                None => (0..3).for_each(|c| border.link(base + c, *node, m.col(c))),
+                Some(other) => add_block(border, welds[other].unknowns.place(), place, m),
+                None => place.iter().for_each(|(j, v)| border.link(*j, *node, *m * *v)),
             }
         }
-        for member in &model.welds.at(welds[k].slot).expect("living").members {
-            (0..3).for_each(|c| border.carry(base + c, 2 * member.index(model), keep.col(c)));
+        for member in members {
+            place.iter().for_each(|(j, v)| border.carry(*j, 2 * member.index(model), *v));
         }
-        add_block(border, base, base, &(keep * own * keep + (DMat3::IDENTITY - keep)));
-        let right = keep * right;
-        (0..3).for_each(|c| border.push(base + c, right[c]));
+        add_block(border, place, place, &own);
+        place.iter().for_each(|(j, v)| border.push(*j, v.dot(right)));
 
-        let base = base + 3;
-        let keep = welds[k].turning.projector();
-        let (mut own, mut right) = (DMat3::ZERO, DVec3::ZERO);
+        let turning = weld.unknowns.turning();
+        let (mut stiffness, mut moment) = (DMat3::ZERO, DVec3::ZERO);
         for j in joints.iter().filter(|j| j.weld == k) {
-            own += j.stiffness;
-            right += if j.half.first { j.moment } else { -j.moment };
+            stiffness += j.stiffness;
+            moment += if j.half.first { j.moment } else { -j.moment };
             // Rotations do not commute (as between two frames): half of the moment, with the sign of the order.
             let twist = if exact { skew(j.moment * if j.half.first { -0.5 } else { 0.5 }) } else { DMat3::ZERO };
-            let m = (twist - j.stiffness) * keep;
-            (0..3).for_each(|c| border.link(base + c, 2 * j.half.frame as usize + 1, m.col(c)));
+            let m = twist - j.stiffness;
+            turning.iter().for_each(|(c, v)| border.link(*c, 2 * j.half.frame as usize + 1, m * *v));
         }
-        add_block(border, base, base, &(keep * own * keep + (DMat3::IDENTITY - keep)));
-        let right = keep * right;
-        (0..3).for_each(|c| border.push(base + c, right[c]));
+        match weld.at {
+            Carrier::Own(_) => {
+                hold(border, place, &weld.place.projector());
+                hold(border, turning, &weld.turning.projector());
+            }
+            Carrier::Body(_) => stiffness += of_arm(weld.unknowns.arm, weld.force, exact),
+        }
+        add_block(border, turning, turning, &stiffness);
+        turning.iter().for_each(|(j, v)| border.push(*j, v.dot(moment)));
+        let weld = &mut welds[k];
+        (weld.own, weld.right, weld.links) = (own, right, from..links.len());
+    }
+}
+
+/// Gives unknowns whose directions are not free a stiffness of their own.
+fn hold(border: &mut Border, unknowns: &[(usize, DVec3)], keep: &DMat3) {
+    let held = DMat3::IDENTITY - *keep;
+    for (r, (i, _)) in unknowns.iter().enumerate() {
+        for (c, (j, _)) in unknowns.iter().enumerate() {
+            border.add_own(*i, *j, held.col(c)[r]);
+        }
     }
 }
 
@@ -240,11 +393,10 @@ fn weld_of_node(model: &Model, welds: &[Active], node: usize) -> Option<usize> {
     welds.iter().position(|w| w.slot == slot)
 }
 
-fn add_block(border: &mut Border, row: usize, col: usize, m: &DMat3) {
-    for c in 0..3 {
-        for r in 0..3 {
-            border.add_own(row + r, col + c, m.col(c)[r]);
-        }
+fn add_block(border: &mut Border, rows: &[(usize, DVec3)], columns: &[(usize, DVec3)], m: &DMat3) {
+    for (j, v) in columns {
+        let pull = *m * *v;
+        rows.iter().for_each(|(i, u)| border.add_own(*i, *j, u.dot(pull)));
     }
 }
 

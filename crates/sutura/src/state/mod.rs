@@ -59,6 +59,8 @@ pub struct State {
     pub(crate) shape_target: Vec<Pose>,
 
     pub(crate) bodies: Slots<BodyState>,
+    /// By slot, force of the threads of each weld on the body that it is on \[N\].
+    pub(crate) weld_force: Vec<DVec3>,
     pub(crate) grips: Slots<GripState>,
     pub(crate) loads: Slots<LoadState>,
     pub(crate) reels: Slots<ReelState>,
@@ -90,9 +92,10 @@ impl Saved {
     }
 }
 
-/// A free body.
+/// A rigid body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BodyState {
+    pub motion: Moved,
     /// Center of mass \[m\], and `world_from_principal`.
     pub position: DVec3,
     pub orientation: DQuat,
@@ -102,6 +105,34 @@ pub(crate) struct BodyState {
     /// Rates of the two, where the integrator needs them and `history` says that they are known; else zero.
     pub acceleration: DVec3,
     pub torque: DVec3,
+}
+
+/// What moves a body. Poses are `world_from_principal`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Moved {
+    Free,
+    /// To where the user wants it at the end of the next step.
+    Driven {
+        target: Pose,
+    },
+    /// With another body, which nothing holds: where it is in that one's principal frame.
+    Held {
+        by: u32,
+        at: Pose,
+    },
+}
+
+impl BodyState {
+    pub fn pose(&self) -> Pose {
+        Pose::new(self.position, self.orientation)
+    }
+    /// Angular velocity in world axes, of these principal moments \[rad/s\].
+    pub fn spin(&self, moments: DVec3) -> DVec3 {
+        self.orientation * ((self.orientation.conjugate() * self.angular_momentum) / moments)
+    }
+    pub fn place(&mut self, pose: &Pose) {
+        (self.position, self.orientation) = (pose.position, pose.orientation);
+    }
 }
 
 /// A grip in action.
@@ -147,6 +178,17 @@ pub(crate) struct ReelState {
 }
 
 impl State {
+    /// The body that a body moves with: the one that holds it, or itself.
+    pub(crate) fn root_of(&self, body: u32) -> u32 {
+        match self.bodies.at(body).map(|b| b.motion) {
+            Some(Moved::Held { by, .. }) => by,
+            _ => body,
+        }
+    }
+    /// Whether contact can move a body.
+    pub(crate) fn gives_way(&self, body: u32) -> bool {
+        self.bodies.at(self.root_of(body)).is_some_and(|b| b.motion == Moved::Free)
+    }
     /// Forgets the accelerations, for `why`.
     pub(crate) fn invalidate(&mut self, why: History) {
         self.history = why;
@@ -177,6 +219,7 @@ impl State {
             shape_pose,
             shape_target,
             bodies,
+            weld_force,
             grips,
             loads,
             reels,
@@ -200,6 +243,7 @@ impl State {
         self.shape_pose.clone_from(shape_pose);
         self.shape_target.clone_from(shape_target);
         self.bodies.copy_from(bodies);
+        self.weld_force.clone_from(weld_force);
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
         self.reels.copy_from(reels);

@@ -5,10 +5,11 @@ use crate::error::Error;
 use crate::finite::in_proportion;
 use crate::handle::Handle;
 use crate::math::Pose;
-use crate::model::body::{Body, BodyModel, BodySpec};
+use crate::model::body::{Body, BodyModel, BodyMotion, BodySpec};
 use crate::model::shape::{Shape, ShapeMotion};
+use crate::model::weld::WeldModel;
 use crate::params::Solver;
-use crate::state::{BodyState, History};
+use crate::state::{BodyState, History, Moved};
 use crate::view::BodyView;
 use glam::DVec3;
 
@@ -25,6 +26,7 @@ impl World {
         let turn = center.orientation;
         let spin = turn.conjugate() * spec.angular_velocity;
         let state = BodyState {
+            motion: Moved::Free,
             position: center.position,
             orientation: turn,
             velocity: spec.velocity,
@@ -57,16 +59,65 @@ impl World {
         Ok(handle)
     }
 
-    /// Removes a body and its shapes.
+    /// Removes a body and its shapes. What it held is free from then on, and threads come off it.
     pub fn remove_body(&mut self, body: Handle<Body>) -> Result<(), Error> {
         let gone = self.model.bodies.remove(body).ok_or(BODY)?;
         self.state.bodies.remove(body);
+        let held = |b: &&mut BodyState| matches!(b.motion, Moved::Held { by, .. } if by == body.index);
+        self.state.bodies.iter_mut().map(|(_, b)| b).filter(held).for_each(|b| b.motion = Moved::Free);
+        let on_it = |w: &WeldModel| w.anchor.is_some_and(|a| a.body == body.index);
+        let welds: Vec<u32> = self.model.welds.iter().filter(|(_, w)| on_it(w)).map(|(slot, _)| slot).collect();
+        for slot in welds {
+            self.remove_weld(self.model.welds.handle(slot))?;
+        }
         for (shape, _) in gone.shapes {
             self.model.shapes.empty(shape);
             let touches = |site: crate::state::Site| site.any_shape() == Some(shape);
             self.state.contacts.retain(|c| !touches(c.a) && !touches(c.b));
         }
         self.state.invalidate(History::Unknown);
+        Ok(())
+    }
+
+    /// Changes what moves a body, from the next step on. One that is driven stays where it is until it is told where to
+    /// go, one that is held stays where it is on the one that holds it, and neither jumps. What holds a body is held by
+    /// nothing.
+    pub fn set_body_motion(&mut self, body: Handle<Body>, motion: BodyMotion) -> Result<(), Error> {
+        let own = self.state.bodies.get(body).ok_or(BODY)?;
+        let pose = own.pose();
+        let moved = match motion {
+            BodyMotion::Free => Moved::Free,
+            BodyMotion::Driven => Moved::Driven { target: pose },
+            BodyMotion::Held { by } => {
+                let holder = self.state.bodies.get(by).ok_or(BODY)?;
+                let holds = |b: &BodyState| matches!(b.motion, Moved::Held { by, .. } if by == body.index);
+                if by == body || matches!(holder.motion, Moved::Held { .. }) {
+                    return Err(Error::invalid("body", "by", by, "another body, which nothing holds"));
+                }
+                if self.state.bodies.iter().any(|(_, b)| holds(b)) {
+                    return Err(Error::invalid("body", "by", by, "nothing, while this body holds another one"));
+                }
+                Moved::Held { by: by.index, at: holder.pose().inverse().compose(&pose) }
+            }
+        };
+        let body = self.state.bodies.get_mut(body).ok_or(BODY)?;
+        body.motion = moved;
+        self.state.invalidate(History::Unknown);
+        Ok(())
+    }
+
+    /// Where the frame of a driven body is wanted at the end of the next step, `world_from_body`. On the way there it
+    /// moves and turns evenly.
+    pub fn set_body_pose(&mut self, body: Handle<Body>, pose: Pose) -> Result<(), Error> {
+        let mass = self.model.bodies.get(body).ok_or(BODY)?.mass;
+        let state = self.state.bodies.get_mut(body).ok_or(BODY)?;
+        if !pose.is_valid() {
+            return Err(Error::invalid("body", "pose", pose, "finite, with a unit quaternion"));
+        }
+        match &mut state.motion {
+            Moved::Driven { target } => *target = pose.compose(&Pose::new(mass.center, mass.axes)),
+            _ => return Err(Error::invalid("body", "motion", "not driven", "Driven, for a pose to be set")),
+        }
         Ok(())
     }
 

@@ -35,6 +35,13 @@ impl World {
         {
             return Err(Error::invalid("grip", "place", spec.place, "a piece that no other grip holds"));
         }
+        if wanted
+            .clone()
+            .filter_map(|i| self.model.weld_of[i])
+            .any(|w| self.model.welds.at(w).is_some_and(|w| w.anchor.is_some()))
+        {
+            return Err(Error::invalid("grip", "place", spec.place, "a piece that is not attached to a body"));
+        }
         let i = (rod.first + index) as usize;
         let state = &self.state;
         if spec.hold == Hold::Jaw

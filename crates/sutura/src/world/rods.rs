@@ -75,6 +75,7 @@ impl World {
             self.join(
                 vec![member(n as u32, Some(Side::along(before)), None), member(0, None, Some(Side::along(after)))],
                 orientation,
+                None,
             );
         }
         Ok(handle)
@@ -176,9 +177,8 @@ impl World {
         for (_, weld) in model.welds.iter_mut() {
             weld.members.retain(|m| m.rod != rod.index);
         }
-        let apart: Vec<WeldModel> =
-            model.welds.iter().map(|(_, w)| w).filter(|w| w.members.len() < 2).cloned().collect();
-        model.welds.retain(|w| w.members.len() >= 2);
+        let apart: Vec<WeldModel> = model.welds.iter().map(|(_, w)| w).filter(|w| !w.joins()).cloned().collect();
+        model.welds.retain(WeldModel::joins);
         model.refresh_welds();
         state.reels.retain(|r| r.rod != rod.index);
         apart.iter().for_each(|weld| self.hold_alone(weld));

@@ -6,7 +6,7 @@ use crate::math::Pose;
 use crate::model::body::BodyModel;
 use crate::model::grip::{Hold, LoadKind, Place};
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{Contact, History, Site, State};
+use crate::state::{Contact, History, Moved, Site, State};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -104,9 +104,20 @@ impl World {
         }
         for (_, b) in s.bodies.iter() {
             let vectors = [b.position, b.velocity, b.angular_momentum, b.acceleration, b.torque];
-            if !vectors.iter().all(|v| v.is_finite()) || !b.orientation.is_normalized() {
+            let with_another = |by: u32, at: &Pose| {
+                at.is_valid() && s.bodies.at(by).is_some_and(|b| !matches!(b.motion, Moved::Held { .. }))
+            };
+            let driven = match &b.motion {
+                Moved::Free => true,
+                Moved::Driven { target } => target.is_valid(),
+                Moved::Held { by, at } => with_another(*by, at),
+            };
+            if !vectors.iter().all(|v| v.is_finite()) || !b.orientation.is_normalized() || !driven {
                 return Err("a body is out of range");
             }
+        }
+        if s.weld_force.len() != s.weld_orientation.len() || !s.weld_force.iter().all(|f| f.is_finite()) {
+            return Err("a force at a weld is out of range");
         }
         let on_its_body = |(slot, model): (u32, &BodyModel)| {
             let pose = s.bodies.at(slot).map(|b| Pose::new(b.position, b.orientation));

@@ -121,6 +121,7 @@ impl World {
             pose: self.state.shape_pose[shape.index()],
             motion: s.motion,
             surface: s.surface,
+            body: s.body.map(|b| b as usize),
             slot: shape.index(),
         })
     }

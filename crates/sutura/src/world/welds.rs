@@ -1,18 +1,19 @@
 //! Welds: threads joined and taken apart.
 
-use super::{ROD, WELD, World};
+use super::{BODY, ROD, WELD, World};
 use crate::error::Error;
 use crate::handle::Handle;
+use crate::math::Pose;
 use crate::model::grip::{Hold, Place};
 use crate::model::rod::Rod;
-use crate::model::weld::{Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
+use crate::model::weld::{Anchor, Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
 use crate::row;
 use crate::state::History;
 use glam::{DQuat, DVec3};
 
 impl World {
-    /// Joins places of threads. Where they lie apart (by a tenth of a radius at most) they meet in the middle, or at
-    /// the one that is held.
+    /// Joins places of threads with each other, or with a body. Where they lie apart (by a tenth of a radius at most)
+    /// they meet in the middle, at the one that is held, or on the body.
     pub fn insert_weld(&mut self, spec: &WeldSpec) -> Result<Handle<Weld>, Error> {
         spec.validate()?;
         let (model, state) = (&self.model, &self.state);
@@ -35,19 +36,31 @@ impl World {
             places.push((rod.index, particle, i));
         }
         let least = places.iter().map(|p| self.radius_of(p.2)).fold(f64::INFINITY, f64::min);
-        let middle = places.iter().map(|p| state.position[p.2]).sum::<DVec3>() / places.len() as f64;
+        let on = match &spec.anchor {
+            None => None,
+            Some(anchor) => {
+                let mass = &model.bodies.get(anchor.body).ok_or(BODY)?.mass;
+                let body = state.bodies.get(anchor.body).ok_or(BODY)?;
+                let frame = body.pose().compose(&Pose::new(mass.center, mass.axes).inverse());
+                Some((anchor, *body, frame.transform_point(anchor.point)))
+            }
+        };
+        let middle = match on {
+            Some((.., point)) => point,
+            None => places.iter().map(|p| state.position[p.2]).sum::<DVec3>() / places.len() as f64,
+        };
         let apart = places.iter().map(|p| (state.position[p.2] - middle).length()).fold(0.0, f64::max);
         if apart > 0.1 * least {
             return Err(Error::invalid("weld", "places", apart, "places within a tenth of a radius of each other [m]"));
         }
         let held: Vec<usize> = places.iter().map(|p| p.2).filter(|i| crate::reel::held(model, state, *i)).collect();
-        if held.len() > 1 {
-            return Err(Error::invalid(
-                "weld",
-                "places",
-                format!("{} held", held.len()),
-                "at most one place that a grip holds",
-            ));
+        let (most, wanted) = if on.is_some() {
+            (0, "places that no grip holds, on a body")
+        } else {
+            (1, "at most one that a grip holds")
+        };
+        if held.len() > most {
+            return Err(Error::invalid("weld", "places", format!("{} held", held.len()), wanted));
         }
         let frames = |(slot, particle, i): (u32, u32, usize)| {
             let n = model.rods.at(slot).expect("just read").n_elements;
@@ -75,7 +88,7 @@ impl World {
             .or(after)
             .expect("a thread has frames");
         let straight = |q: DQuat, outward: DVec3| match spec.rest {
-            WeldRest::AsInserted => q,
+            WeldRest::AsInserted | WeldRest::Loose => q,
             // Turned so that it goes on where the first one leads.
             WeldRest::Straight => {
                 let leads = orientation * if before.is_some() { DVec3::Z } else { DVec3::NEG_Z };
@@ -94,6 +107,7 @@ impl World {
                         "ends of threads where they go on straight",
                     ));
                 }
+                _ if spec.rest == WeldRest::Loose => (None, None),
                 (a, b) if k == 0 && clamp.is_some() => {
                     let held = Side::along(clamp.map_or(DQuat::IDENTITY, |g| g.rest_half));
                     (a.map(|_| held), b.map(|_| held))
@@ -117,10 +131,23 @@ impl World {
             return Err(Error::invalid("weld", "places", velocity, "places of finite momentum"));
         }
         let at = held.first().map_or(middle, |i| state.position[*i]);
+        let velocity = match (&on, &spec.anchor) {
+            (Some((_, body, point)), Some(anchor)) => {
+                let moments = model.bodies.get(anchor.body).ok_or(BODY)?.mass.moments;
+                body.velocity + body.spin(moments).cross(*point - body.position)
+            }
+            _ => velocity,
+        };
+        let anchor = on.map(|(anchor, body, point)| Anchor {
+            body: anchor.body.index,
+            pose: body.pose().inverse().compose(&Pose::new(point, orientation)),
+            strength: anchor.strength.unwrap_or(f64::INFINITY),
+            filter_distance: 0.0,
+        });
         for (_, _, i) in places {
             (self.state.position[i], self.state.velocity[i]) = (at, velocity);
         }
-        Ok(self.join(members, orientation))
+        Ok(self.join(members, orientation, anchor))
     }
 
     /// Takes a weld apart. A thread that went through it goes on, ends are free. A clamp there goes on holding its own
@@ -155,14 +182,20 @@ impl World {
         Ok(self.model.weld_of[(r.first + particle) as usize].map(|slot| self.model.welds.handle(slot)))
     }
 
-    pub(super) fn join(&mut self, members: Vec<Member>, orientation: DQuat) -> Handle<Weld> {
+    pub(super) fn join(&mut self, members: Vec<Member>, orientation: DQuat, anchor: Option<Anchor>) -> Handle<Weld> {
         self.state.invalidate(History::Unknown);
         let radius = members.iter().map(|m| self.radius_of(m.index(&self.model))).fold(0.0, f64::max);
-        let mut weld = WeldModel { members, filter_distance: core::f64::consts::PI * radius };
+        let mut weld = WeldModel { members, anchor, filter_distance: core::f64::consts::PI * radius };
         weld.filter_distance = crate::collide::filter_distance(&self.model, &self.state.position, &weld);
+        let on_body = crate::collide::filter_distance_on_body(&self.model, &self.state, &weld);
+        if let Some(anchor) = &mut weld.anchor {
+            anchor.filter_distance = on_body;
+        }
         let handle: Handle<Weld> = self.model.welds.insert(weld);
         self.state.weld_orientation.resize(self.model.welds.len(), DQuat::IDENTITY);
         self.state.weld_orientation[handle.index()] = orientation;
+        self.state.weld_force.resize(self.model.welds.len(), DVec3::ZERO);
+        self.state.weld_force[handle.index()] = DVec3::ZERO;
         self.model.refresh_welds();
         handle
     }

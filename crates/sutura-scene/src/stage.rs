@@ -1002,6 +1002,14 @@ impl Live for Stage {
             Read::TwistRate => Value::Number(self.at_joint(args, |r, j| bend(r, j).z)),
             Read::Force => Value::Vector(self.wrench(place).force),
             Read::Torque => Value::Vector(self.wrench(place).torque),
+            Read::Mass => Value::Number(match place {
+                Ref::Body(b) => self.body(b).map_or(f64::NAN, |b| b.mass().mass),
+                _ => f64::NAN,
+            }),
+            Read::Center => Value::Vector(match place {
+                Ref::Body(b) => self.body(b).map_or(DVec3::NAN, |b| b.center()),
+                _ => DVec3::NAN,
+            }),
             Read::Tip => Value::Vector(self.tip(place)),
             Read::Pull => Value::Vector(self.pull(place)),
             Read::Wrench => {

@@ -213,7 +213,9 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                 }
             }
         };
-        let fall = model.settings.gravity * (stage.span * stage.span);
+        // What hangs on a thread starts as that does: it would stretch it.
+        let hangs = model.welds.iter().any(|(_, w)| w.anchor.is_some_and(|a| a.body == slot));
+        let fall = if hangs { DVec3::ZERO } else { model.settings.gravity * (stage.span * stage.span) };
         let orientation = turned_freely(moments, start.base, start.momentum, stage.span);
         let now = state.bodies.at_mut(slot).expect("living");
         if now.motion == Moved::Free {

@@ -10,6 +10,7 @@ use crate::collide::Candidates;
 use crate::effort::Effort;
 use crate::math::max_or_nan;
 use crate::model::Model;
+use crate::model::weld::WeldModel;
 use crate::motion::Motion;
 use crate::rod::assemble::{Hessian, assemble};
 use crate::rod::brake;
@@ -26,6 +27,9 @@ const TURN_MOST: f64 = 0.3;
 /// Force along a step after it, over the force before it and with the opposite sign, beyond which the step is
 /// shortened.
 const OVERSHOOT: f64 = 0.5;
+
+/// Part of the work of turning that is uncertain where bodies hang on threads.
+const STRAIGHT: f64 = 0.05;
 
 /// Turn of an iteration over that of the one before beyond which a substep without contacts goes over to the exact
 /// matrix.
@@ -81,7 +85,12 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
     // Inextensible elements at a weld have their stiffness in the matrix, and the digits that this costs are those of
     // the next iteration.
     let firm = |rod: u32| model.rods.at(rod).is_some_and(|r| r.stretch == crate::Stretch::Inextensible);
-    let least = if model.welds.iter().any(|(_, weld)| weld.members.iter().any(|m| firm(m.rod))) { 2 } else { 1 };
+    let hangs = |w: &WeldModel| w.anchor.is_some_and(|a| state.gives_way(a.body));
+    let hanging = model.welds.iter().any(|(_, weld)| hangs(weld));
+    let stiff = |w: &WeldModel| w.members.iter().any(|m| firm(m.rod));
+    // What hangs and turns by little more than nothing has second thoughts too: a stiff thread is stretched by that with
+    // more than the weight of a needle.
+    let least = if hanging || model.welds.iter().any(|(_, weld)| stiff(weld)) { 2 } else { 1 };
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.
     let (mut gained, mut scale) = (0.0_f64, 1.0);
@@ -111,9 +120,11 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             }
             // Where the force along the last step has turned round the step went too far: contacts opened, closed or
             // began to slide on the way. Go back to where a straight line between the two forces says that it vanishes.
-            let left = work(rods, work_of_others(rods, rows)) + rods.work_of_turn(model, state)
-                - row::shape::work_unforeseen(rows, &rods.step);
-            if left > -OVERSHOOT * gained {
+            let turning = rods.work_of_turn(model, state);
+            let left = work(rods, work_of_others(rods, rows)) + turning - row::shape::work_unforeseen(rows, &rods.step);
+            // That of turning is taken along a straight step, and what hangs goes along an arc.
+            let unsure = if hanging { STRAIGHT * turning.abs() } else { 0.0 };
+            if left > -OVERSHOOT * gained - unsure {
                 break;
             }
             let part = (gained / (gained - left)).max(SHORTEST);

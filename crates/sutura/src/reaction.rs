@@ -23,7 +23,9 @@ pub(crate) fn reactions(model: &Model, state: &mut State, solver: &mut Solver, h
         None => rhs[2 * i],
     };
     for (slot, weld) in model.welds.iter().filter(|(_, w)| w.anchor.is_some()) {
-        state.weld_force[slot as usize] = weld.members.iter().map(|m| rhs[2 * m.index(model)]).sum();
+        // Where nothing moves the body nothing was predicted.
+        let lacking = || weld.members.iter().map(|m| rhs[2 * m.index(model)]).sum();
+        state.weld_force[slot as usize] = rows.welds.predicted(slot).unwrap_or_else(lacking);
     }
     let (position, grips) = (&state.position, &mut state.grips);
     for (slot, grip) in grips.iter_mut() {

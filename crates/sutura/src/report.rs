@@ -4,7 +4,9 @@ use crate::collide::overlap::{Overlap, OverlapWith};
 use crate::error::coordinates;
 use crate::handle::Handle;
 use crate::model::rod::Rod;
+use crate::model::weld::Weld;
 use crate::rejection::Rejection;
+use glam::DVec3;
 
 /// What one call of [`World::step`](crate::World::step) did, and what it reached.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,6 +43,9 @@ pub struct StepReport {
     /// Contacts that carried force at the end; with the paper's solver, which has no forces, those that pushed in the
     /// last substep.
     pub contacts: u32,
+    /// Welds whose threads came off their bodies at the end of it, with the force that they pulled with \[N\]
+    /// ([`WeldAnchor::strength`](crate::WeldAnchor::strength)).
+    pub detached: Vec<(Handle<Weld>, DVec3)>,
     /// What went wrong.
     pub incidents: Vec<Incident>,
 }

@@ -2,8 +2,8 @@
 
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Body, BodyMotion, BodySpec, ColliderSpec, Geometry, GripSpec, Handle, Hold, Integrator, Material, Place, Pose, Rod,
-    RodSpec, Settings, WeldRest, WeldSpec, World,
+    Body, BodyMotion, BodySpec, ColliderSpec, Geometry, GripSpec, Handle, Hold, Integrator, Material, NeedleSpec,
+    Place, Pose, Rod, RodSpec, Settings, WeldRest, WeldSpec, World,
 };
 
 const G: f64 = 9.81;
@@ -121,12 +121,12 @@ fn period(world: &mut World, body: Handle<Body>) -> f64 {
 fn a_bar_swings_as_a_compound_pendulum() {
     let angle: f64 = 0.2;
     let down = DVec3::new(angle.sin(), 0.0, -angle.cos());
-    let (length, radius, density) = (0.01, 1.2e-4, 1150.0);
+    let (length, radius, density) = (0.01, 3e-4, 1150.0);
     for (loose, integrator) in
         [(false, Integrator::ImplicitEuler), (true, Integrator::TrBdf2), (false, Integrator::TrBdf2)]
     {
         let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
-        let material = Material::elastic(2e12, density);
+        let material = Material::elastic(1e11, density);
         let from = if loose { DVec3::X * length } else { DVec3::ZERO };
         let to = if loose { DVec3::ZERO } else { down * length };
         let rod = world.insert_rod(&RodSpec::straight(from, to, 8, radius, material)).unwrap();
@@ -209,4 +209,69 @@ fn attachments_are_saved_and_come_apart_with_their_body() {
     assert_eq!(world.view().welds().count(), 0);
     step(&mut world, 20);
     world.insert_grip(&GripSpec::at_once(rod, Place::End, Hold::Pin)).unwrap();
+}
+
+/// A needle on a thread goes from one driver to the other and back, twenty times, while both move.
+#[test]
+fn a_needle_that_is_handed_over_does_not_drift() {
+    let mut world = World::new(Settings::default()).unwrap();
+    let rod = world.insert_rod(&thread(DVec3::new(-0.1, 0.0, 0.0), DVec3::ZERO, 100)).unwrap();
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
+    let needle = NeedleSpec::preset("SH").unwrap();
+    let pose = needle.pose(DVec3::ZERO, DVec3::X, DVec3::Z);
+    let body = world.insert_body(&needle.body(pose).unwrap()).unwrap();
+    world.insert_weld(&WeldSpec::to_body((rod, Place::End), body, DVec3::ZERO)).unwrap();
+    let block = |at: DVec3| BodySpec::solid(Geometry::Box { half_sides: DVec3::splat(1e-3) }, 7900.0, Pose::at(at));
+    let places = [DVec3::new(0.006, 0.0, 0.006), DVec3::new(0.012, 0.0, 0.006)];
+    let drivers = places.map(|at| world.insert_body(&block(at)).unwrap());
+    drivers.iter().for_each(|d| world.set_body_motion(*d, BodyMotion::Driven).unwrap());
+    for k in 0..20_u32 {
+        let holder = drivers[k as usize % 2];
+        world.set_body_motion(body, BodyMotion::Held { by: holder }).unwrap();
+        for s in 1..=24 {
+            let angle = std::f64::consts::TAU * (f64::from(k * 24 + s) / 480.0);
+            let (sin, cos) = angle.sin_cos();
+            let shift = DVec3::new(cos - 1.0, sin, 0.5 * sin) * 0.005;
+            for (driver, at) in drivers.iter().zip(places) {
+                world.set_body_pose(*driver, Pose::at(at + shift)).unwrap();
+            }
+            step(&mut world, 1);
+            let now = world.body(body).unwrap().pose();
+            let wanted = Pose::new(pose.position + shift, pose.orientation);
+            let off = (now.position - wanted.position).length();
+            assert!(off < 1e-12 && now.orientation.angle_between(wanted.orientation) < 1e-7, "{k}: {off:e}");
+            assert_eq!(gap(&world, rod, body, DVec3::ZERO), 0.0);
+        }
+    }
+    // Let go, it falls and hangs on its thread.
+    world.set_body_motion(body, BodyMotion::Free).unwrap();
+    drivers.iter().for_each(|d| world.remove_body(*d).unwrap());
+    step(&mut world, 240);
+    assert!(world.body(body).unwrap().center().z < -0.05);
+}
+
+/// What binds is torn: a swage bears its strength and no more.
+#[test]
+fn a_swage_comes_off_at_its_strength() {
+    for (strength, holds) in [(1.1, true), (0.9, false)] {
+        let mut world = World::new(Settings { gravity: DVec3::ZERO, ..Settings::default() }).unwrap();
+        let rod = world.insert_rod(&thread(DVec3::ZERO, DVec3::X * 0.05, 40)).unwrap();
+        let grip = world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).unwrap();
+        let body = world.insert_body(&bar(7900.0, Pose::new(DVec3::X * 0.05, DQuat::from_rotation_y(-1.57)))).unwrap();
+        world.set_body_motion(body, BodyMotion::Driven).unwrap();
+        let mut weld = WeldSpec::to_body((rod, Place::End), body, DVec3::ZERO);
+        weld.anchor.as_mut().unwrap().strength = Some(strength);
+        let weld = world.insert_weld(&weld).unwrap();
+        // Stretched to 1 N.
+        let stiffness = 2e9 * std::f64::consts::PI * 1.2e-4 * 1.2e-4 / 0.05;
+        let mut events = Vec::new();
+        for k in 1..=60 {
+            let shift = DVec3::NEG_X * (f64::from(k) / 60.0 / stiffness);
+            world.set_grip_pose(grip, Pose::at(shift)).unwrap();
+            events.extend(world.step(DT).detached);
+        }
+        assert_eq!(world.view().welds().count() == 1, holds, "{strength}");
+        assert_eq!(events.is_empty(), holds);
+        assert!(events.iter().all(|(w, force)| *w == weld && (0.9..0.95).contains(&force.length())), "{events:?}");
+    }
 }

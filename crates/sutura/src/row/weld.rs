@@ -231,6 +231,11 @@ impl Welds {
         }
     }
 
+    /// Force of the threads of a weld on the body that it is on as the last step predicted it, where the body moves.
+    pub fn predicted(&self, slot: u32) -> Option<DVec3> {
+        self.welds.iter().find(|w| w.slot == slot && w.unknowns.n_place == SIX).map(|w| w.force)
+    }
+
     /// Finds the unknowns of each weld at the iterate.
     fn find_unknowns(&mut self, state: &State, movers: &Movers) {
         let after = movers.count();

@@ -199,6 +199,7 @@ impl World {
             Solver::Paper(p) => crate::pbd::step(model, state, &mut scratch.paper, interval, &p, &mut report),
         }
         report.time = self.state.time;
+        self.detach(&mut report);
         self.work += report.work;
         self.report_overlaps(&teleported, &mut report);
         if self.model.settings.solver == Solver::Direct {

@@ -7,6 +7,7 @@ use crate::math::Pose;
 use crate::model::grip::{Hold, Place};
 use crate::model::rod::Rod;
 use crate::model::weld::{Anchor, Member, Side, Weld, WeldModel, WeldRest, WeldSpec};
+use crate::report::StepReport;
 use crate::row;
 use crate::state::History;
 use glam::{DQuat, DVec3};
@@ -159,6 +160,19 @@ impl World {
         self.model.refresh_welds();
         self.hold_alone(&gone);
         Ok(())
+    }
+
+    /// Takes off their bodies the threads that pull at them with more than the welds bear.
+    pub(super) fn detach(&mut self, report: &mut StepReport) {
+        let force = |slot: u32| self.state.weld_force[slot as usize];
+        let torn = |(slot, w): (u32, &WeldModel)| {
+            w.anchor.filter(|a| force(slot).length() > a.strength).map(|_| (self.model.welds.handle(slot), force(slot)))
+        };
+        report.detached.extend(self.model.welds.iter().filter_map(torn));
+        for (weld, _) in &report.detached {
+            // It was there a moment ago.
+            let _ = self.remove_weld(*weld);
+        }
     }
 
     /// Clamps at a weld that is gone hold the cross-section of their own thread from now on, with the moment that it

@@ -225,7 +225,7 @@ pub(crate) fn factor(
     for (rod, zone) in ranges.iter() {
         positive &= system.factor(rod.clone(), zone);
     }
-    rows.border.factor(system, ranges, constraint) && positive
+    rows.border.factor(system, ranges, constraint, rows.movers.of_bodies()) && positive
 }
 
 /// Takes held nodes out of the system and puts the drive on guided ones.

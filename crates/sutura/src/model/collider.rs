@@ -330,19 +330,11 @@ impl Collider {
             Collider::Surface(surface) => &surface.mesh,
         };
         let local = shape.compute_local_aabb();
-        let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for k in 0..8 {
-            let pick = |bit: usize, a: f64, b: f64| if k >> bit & 1 == 0 { a } else { b };
-            let corner = DVec3::new(
-                pick(0, local.mins.x, local.maxs.x),
-                pick(1, local.mins.y, local.maxs.y),
-                pick(2, local.mins.z, local.maxs.z),
-            );
-            let p = pose.transform_point(from_parry(corner));
-            lo = lo.min(p);
-            hi = hi.max(p);
-        }
-        (lo, hi)
+        let (a, b) = (from_parry(local.mins), from_parry(local.maxs));
+        let (middle, half) = (pose.transform_point((a + b) * 0.5), (b - a).abs() * 0.5);
+        let turn = DMat3::from_quat(pose.orientation);
+        let reach = turn.x_axis.abs() * half.x + turn.y_axis.abs() * half.y + turn.z_axis.abs() * half.z;
+        (middle - reach, middle + reach)
     }
 
     /// World box that holds the shape all the way from one pose to another.

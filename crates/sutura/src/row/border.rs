@@ -11,7 +11,7 @@
 
 use crate::math::solve_dense;
 use crate::rod::constraint::NodeConstraint;
-use crate::rod::factor::System;
+use crate::rod::factor::{Six, System};
 use crate::row::ldl::Ldl;
 use core::ops::Range;
 use glam::DVec3;
@@ -48,6 +48,32 @@ pub(crate) struct Border {
     /// The factor for a part of the unknowns that the others do not depend on.
     part: Ldl,
     part_positive: bool,
+    /// Responses of six unknowns together.
+    six: Vec<Six>,
+}
+
+/// Finds the responses of a rod to six unknowns, which begin as what pushes it.
+fn respond_together(
+    system: &System,
+    rod: &Range<usize>,
+    zone: &Range<usize>,
+    columns: &mut [Column],
+    z: &mut Vec<Six>,
+) {
+    let (first, last) = (2 * rod.start, 2 * rod.end);
+    let linked = || columns.iter().flat_map(|c| &c.links).map(|(node, _)| *node).filter(|k| (first..last).contains(k));
+    let (Some(least), Some(most)) = (linked().min(), linked().max()) else { return };
+    z.clear();
+    z.resize(last - first, [DVec3::ZERO; 6]);
+    for k in least..=most {
+        z[k - first] = core::array::from_fn(|c| columns[c].response[k]);
+    }
+    system.solve_six(rod, zone, z, least - first..most + 1 - first);
+    for (c, column) in columns.iter_mut().enumerate() {
+        for (to, from) in column.response[first..last].iter_mut().zip(&*z) {
+            *to = from[c];
+        }
+    }
 }
 
 impl Border {
@@ -122,16 +148,17 @@ impl Border {
         &self.columns[k].response
     }
 
-    /// Takes what is held out of B and finds the responses; the rods' system is factored. False when the whole is not
-    /// positive definite.
+    /// Takes what is held out of B and finds the responses; the rods' system is factored. `sixes` are unknowns of which
+    /// six at a time are linked to much the same nodes. False when the whole is not positive definite.
     pub fn factor(
         &mut self,
         system: &System,
         rods: &[(Range<usize>, Range<usize>)],
         constraint: &[NodeConstraint],
+        sixes: Range<usize>,
     ) -> bool {
         let n = self.count;
-        for c in &mut self.columns[..n] {
+        for (k, c) in self.columns[..n].iter_mut().enumerate() {
             c.response.clear();
             c.response.resize(constraint.len(), DVec3::ZERO);
             for (node, v) in &mut c.links {
@@ -141,10 +168,20 @@ impl Border {
                 c.response[*node] += *v;
             }
             for (rod, zone) in rods {
+                if sixes.contains(&k) && !system.tied[rod.start] {
+                    continue;
+                }
                 if c.response[2 * rod.start..2 * rod.end].iter().any(|v| *v != DVec3::ZERO) {
                     system.solve(rod.clone(), zone, &mut c.response);
                 }
             }
+        }
+        for (rod, zone) in rods.iter().filter(|(rod, _)| !system.tied[rod.start]) {
+            for six in self.columns[sixes.clone()].chunks_exact_mut(6) {
+                respond_together(system, rod, zone, six, &mut self.six);
+            }
+        }
+        for c in &mut self.columns[..n] {
             for (node, v) in &c.carried {
                 c.response[*node] = -*v;
             }

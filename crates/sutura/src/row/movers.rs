@@ -19,6 +19,7 @@ use crate::motion::Motion;
 use crate::row::border::Border;
 use crate::row::side::Moves;
 use crate::state::{BodyState, Moved, State};
+use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
 
 /// A shape on a line.
@@ -161,6 +162,11 @@ impl Movers {
     /// Number of unknowns.
     pub fn count(&self) -> usize {
         self.sliders.len() + SIX * self.roots
+    }
+
+    /// Those of bodies, six each.
+    pub fn of_bodies(&self) -> Range<usize> {
+        self.sliders.len()..self.count()
     }
 
     pub fn has_bodies(&self) -> bool {

@@ -7,7 +7,8 @@
 //! two ways have little to do with each other.)
 //!
 //! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements
-//!   with less than `pi r` of thread between them are left out.
+//!   with less than `pi r` of thread between them are left out, and so are those beside a weld or on both sides of a
+//!   cut.
 //! - Thread through shape: the centerline is inside a solid, or comes within a thousandth of the radius of a mesh's
 //!   surface.
 //! - Clearance: (distance of centerlines - radii) / mean diameter at the states themselves, 0 touches, negative
@@ -130,7 +131,7 @@ struct SeenShape {
     alive: bool,
 }
 
-/// Places that are joined at the state at hand: the number of the thread there and the rest arc on it, and up to which
+/// Places that are joined at the state at hand, or were until a cut: the number of the thread there and the rest arc on it, and up to which
 /// way by there elements of the threads do not touch.
 #[derive(Debug)]
 struct SeenWeld {
@@ -181,7 +182,9 @@ impl Audit {
             view.time(),
             rods,
             view.shapes(),
-            view.welds().map(|w| (w.filter_distance(), w.places().collect())),
+            view.welds()
+                .map(|w| (w.filter_distance(), w.places().collect()))
+                .chain(view.cuts().map(|c| (c.filter_distance(), c.places().to_vec()))),
         );
     }
 

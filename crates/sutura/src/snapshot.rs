@@ -396,7 +396,7 @@ impl Build {
             } else if here.along != there.along {
                 "its section, modulus or density changes otherwise along it there".into()
             } else if here.rest != there.rest {
-                "its rest shape is another there".into()
+                "its rest shape is another there, or it was cut elsewhere".into()
             } else {
                 continue;
             };
@@ -440,6 +440,10 @@ impl BuiltRod {
         for side in members.iter().flat_map(|m| [m.before, m.after]).flatten().filter(|s| s.section == DQuat::IDENTITY)
         {
             side.rest_half.put(&mut rest);
+        }
+        // A cut leaves ends that do not touch each other.
+        for faces in model.faces.iter().filter(|f| f.ends.iter().any(|end| end.rod == slot)) {
+            faces.ends.iter().for_each(|end| (end.rod, end.at_end).put(&mut rest));
         }
         BuiltRod {
             slot,

@@ -180,6 +180,7 @@ impl World {
             model.welds.iter().map(|(_, w)| w).filter(|w| w.members.len() < 2).cloned().collect();
         model.welds.retain(|w| w.members.len() >= 2);
         model.refresh_welds();
+        model.faces.retain(|f| f.ends.iter().all(|end| end.rod != rod.index));
         state.reels.retain(|r| r.rod != rod.index);
         apart.iter().for_each(|weld| self.hold_alone(weld));
         Ok(())

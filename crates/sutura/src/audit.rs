@@ -15,7 +15,8 @@
 //!   overlaps; to a shape (distance of centerline from surface - radius) / diameter. Only what is nearer than one
 //!   diameter is looked at.
 //!
-//! A thread or shape that appears, or whose number of particles changes, is taken up from its first state on; a thread
+//! A thread or shape that appears, or whose number of particles changes, or that is a ring which was cut, is taken up from
+//! its first state on; a thread
 //! removed and replaced by one of the same size and radius in the same slot between two states cannot be told from a
 //! move.
 
@@ -113,6 +114,7 @@ struct Frame {
 #[derive(Debug, Clone, Copy)]
 struct SeenRod {
     slot: usize,
+    turned: u32,
     radius: f64,
     first: usize,
     n_particles: usize,
@@ -143,6 +145,8 @@ struct SeenWeld {
 #[derive(Debug, Clone, Copy)]
 struct RodSlice<'a> {
     slot: usize,
+    /// Changes where its particles are numbered otherwise.
+    turned: u32,
     radius: f64,
     positions: &'a [DVec3],
     rest_lengths: &'a [f64],
@@ -174,6 +178,7 @@ impl Audit {
     pub fn observe(&mut self, view: View<'_>) {
         let rods = view.rods().map(|r| RodSlice {
             slot: r.slot(),
+            turned: r.turned(),
             radius: r.radius(),
             positions: r.positions(),
             rest_lengths: r.rest_lengths(),
@@ -224,11 +229,13 @@ impl Audit {
                 return false;
             }
             let same = |old: &&SeenRod| {
-                old.slot == rod.slot && old.n_particles == n_particles && old.radius.to_bits() == rod.radius.to_bits()
+                (old.slot, old.turned, old.n_particles) == (rod.slot, rod.turned, n_particles)
+                    && old.radius.to_bits() == rod.radius.to_bits()
             };
             let first_before = before.rods.iter().find(same).map(|old| old.first);
             now.rods.push(SeenRod {
                 slot: rod.slot,
+                turned: rod.turned,
                 radius: rod.radius,
                 first: now.position.len(),
                 n_particles,

@@ -273,6 +273,10 @@ impl<'a> RodView<'a> {
     pub fn n_elements(&self) -> usize {
         self.rod.n_elements as usize
     }
+    /// How often its particles were numbered from another one on: where a ring is cut.
+    pub(crate) fn turned(&self) -> u32 {
+        self.rod.turned
+    }
     /// Whether its end is joined to its start.
     pub fn is_closed(&self) -> bool {
         let particles = self.rod.particles();

@@ -97,6 +97,7 @@ fn falls(stretch: Stretch) {
         .set_settings(Settings { linear_damping: 0.0, angular_damping: 0.0, substep: 1e-3, integrator, ..settings })
         .unwrap();
     let mut audit = Audit::new();
+    audit.observe(world.view());
     let rest = cut(&mut world, rod, Place::Arc(0.1)).rest.unwrap();
     assert_eq!((world.rod(rod).unwrap().n_elements(), world.rod(rest).unwrap().n_elements()), (50, 50));
     let center = |world: &World| {
@@ -232,6 +233,8 @@ fn a_ring_that_is_cut_opens_and_is_straight() {
         let spec = RodSpec::ring(DVec3::ZERO, DVec3::Z, DVec3::X * 0.02, 60, radius, material.clone());
         let rod = world.insert_rod(&RodSpec { closure: Some(Closure { twist }), ..spec }).unwrap();
         settle(&mut world, 0.02, 1e-7, 100.0);
+        let mut audit = Audit::new();
+        audit.observe(world.view());
         let (bent, at) = (world.rod(rod).unwrap().energy(), world.rod(rod).unwrap().positions()[particle]);
         let found = cut(&mut world, rod, Place::Particle(particle as u32));
         assert_eq!((found.rest, found.particle), (None, particle as u32 % 60));
@@ -241,7 +244,6 @@ fn a_ring_that_is_cut_opens_and_is_straight() {
         // One of 60 joints is gone.
         let left = (r.energy().bend + r.energy().twist) / (bent.bend + bent.twist);
         assert!((left - 59.0 / 60.0).abs() < 1e-6, "{left}");
-        let mut audit = Audit::new();
         for _ in 0..300 {
             let report = world.step_with(0.02, &mut |view| audit.observe(view));
             assert!(report.incidents.is_empty(), "{:?}", report.incidents);

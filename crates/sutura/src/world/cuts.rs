@@ -187,6 +187,7 @@ impl World {
         model.rest_half[first + seam as usize] = crate::math::half(rest);
         let rod = model.rods.at_mut(slot).expect("just read");
         rod.size = rod.size.turned(arc, length);
+        rod.turned += 1;
 
         state.contacts.rename(|site| match site {
             Site::Thread { element, s } if (first..first + n).contains(&(element as usize)) => {

@@ -32,6 +32,7 @@ impl World {
             stretch: spec.stretch,
             flat: crate::model::rod::is_flat(&low.sections),
             surface: spec.surface,
+            turned: 0,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
         model.placed.rods.push(handle.index);

@@ -673,3 +673,47 @@ fn a_grip_driven_by_force_holds_its_part() {
     let moved = world.grip_pose(hand).unwrap().position.x - before;
     assert!((moved / 0.05 - 1.0).abs() < 0.05, "{moved}");
 }
+
+#[test]
+fn contacts_of_a_ring_with_itself_keep_their_forces() {
+    // A trefoil that is closed springs open as far as its own strands let it.
+    let (material, radius) = t1();
+    let n = 120;
+    let at = |t: f64| {
+        DVec3::new(t.sin() + 2.0 * (2.0 * t).sin(), t.cos() - 2.0 * (2.0 * t).cos(), -(3.0 * t).sin()) * 2.5e-3
+    };
+    let points = (0..n).map(|i| at(TAU * f64::from(i) / f64::from(n))).collect();
+    let mut world = World::new(Settings { substep: 1e-3, linear_damping: 0.02, ..quiet() }).unwrap();
+    let spec = RodSpec { closure: Some(Closure::default()), ..RodSpec::new(points, radius, material) };
+    let rod = world.insert_rod(&spec).unwrap();
+    for _ in 0..60 {
+        assert!(world.step(0.005).incidents.is_empty());
+    }
+    // The force of all contacts on each element, named as before the cut.
+    let on_elements = |world: &World, begin: usize| {
+        let mut sum = vec![DVec3::ZERO; n as usize];
+        for c in world.contacts() {
+            for (side, force) in [(c.a, c.force), (c.b, -c.force)] {
+                let (_, element, _) = side.thread().unwrap();
+                sum[(element + begin) % n as usize] += force;
+            }
+        }
+        sum
+    };
+    let (before, count) = (on_elements(&world, 0), world.contacts().count());
+    let pressed = before.iter().map(|f| f.length()).fold(0.0, f64::max);
+    assert!(count >= 3 && pressed > 1e-3, "{count} {pressed:e}");
+    let mut audit = Audit::new();
+    audit.observe(world.view());
+    cut(&mut world, rod, Place::Particle(50));
+    assert_eq!(world.contacts().count(), count);
+    let off = before.iter().zip(on_elements(&world, 50)).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
+    assert!(off < 1e-14 * pressed.max(1.0), "{off:e}");
+    for _ in 0..100 {
+        let report = world.step_with(0.005, &mut |view| audit.observe(view));
+        assert!(report.incidents.is_empty(), "{:?}", report.incidents);
+    }
+    assert!(!audit.report().passes_through);
+    let (a, b) = (world.rod(rod).unwrap().positions()[0], world.rod(rod).unwrap().positions()[n as usize]);
+    assert!(a.distance(b) > 5e-3, "{}", a.distance(b));
+}

@@ -37,8 +37,8 @@ pub struct Thread {
     pub name: String,
     /// Radius \[m\].
     pub radius: f64,
-    /// Elements n; a frame has n + 1 positions and n orientations. Where threads are cut it is the number when the thread
-    /// came, and each frame has those of its own.
+    /// Elements n; a frame has n + 1 positions and n orientations. Where threads are cut it is the number when the
+    /// thread came, and each frame has those of its own.
     pub elements: usize,
     /// What it looks like; recordings of earlier versions have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -283,8 +283,8 @@ impl<'a> IntoIterator for &'a Trajectory {
 }
 
 const MAGIC: &[u8; 8] = b"SUTURATR";
-/// Version 1 has no forces; version 3 says of each frame which threads are there, and of how many elements. What needs no
-/// version 3 is written as version 2.
+/// Version 1 has no forces; version 3 says of each frame which threads are there, and of how many elements. What needs
+/// no version 3 is written as version 2.
 const VERSION: u32 = 3;
 /// See [`VERSION`].
 const OF_HEADER: u32 = 2;

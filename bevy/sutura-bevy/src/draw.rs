@@ -171,7 +171,9 @@ pub(crate) fn show_threads(
         strand.look = thread.look;
         // A reel makes the element at it longer and shorter all the time; what a hundredth of it misses is not seen.
         let fits = |(a, b): (&f64, &f64)| (a - b).abs() <= 0.01 * b;
-        if strand.skin.lengths.len() != n || !strand.skin.lengths.iter().zip(rod.rest_lengths()).all(fits) {
+        // A ring that is cut has two ends.
+        let opened = strand.skin.seam.is_some() && !rod.is_closed();
+        if opened || strand.skin.lengths.len() != n || !strand.skin.lengths.iter().zip(rod.rest_lengths()).all(fits) {
             strand.skin = SkinSpec::of(&rod);
         }
     }
@@ -316,7 +318,12 @@ fn pose_bones(
             continue;
         }
         posed.resize(drawn.bones.len(), Bone::default());
-        drawn.skin.bones_at(&strand.positions, &strand.orientations, &mut posed);
+        if strand.positions.is_empty() {
+            // It is not there: nothing of it has a size.
+            posed.fill(Bone { scale: 0.0, stretch: 0.0, ..Bone::default() });
+        } else {
+            drawn.skin.bones_at(&strand.positions, &strand.orientations, &mut posed);
+        }
         for (entity, bone) in drawn.bones.iter().zip(&posed) {
             let Ok(mut place) = bones.get_mut(*entity) else { continue };
             let (x, q) = (Vec3::from_array(bone.position.to_array()), Quat::from_array(bone.orientation.to_array()));

@@ -6,7 +6,7 @@ use bevy::light::{CascadeShadowConfigBuilder, DirectionalLightShadowMap, Environ
 use bevy::prelude::*;
 use sutura_bevy::look::{BodyLook, Materials, ThreadLook};
 use sutura_bevy::sutura::glam::{DMat3, DQuat, DVec3};
-use sutura_bevy::sutura::{Geometry, Pose};
+use sutura_bevy::sutura::{Geometry, Handle, Pose, Rod};
 use sutura_bevy::{Body, Cloth, Hand, Live, PhysicsClock, Solid, Space, Strand, Sutura, Thread, Triangles};
 use sutura_scene::{Camera, Frame, Header, Runner, Trajectory};
 
@@ -150,18 +150,22 @@ pub fn play(world: &mut World, runner: Runner) {
     stage.frames = vec![runner.frame()];
     stage.camera = scene.camera().copied();
     stage.up = upward(gravity, stage.camera.as_ref());
-    for (i, (name, handle)) in
-        runner.threads().enumerate().map(|(i, (n, h))| (i, (n.to_owned(), h))).collect::<Vec<_>>()
-    {
-        let Ok(rod) = runner.world().rod(handle) else { continue };
-        // What bends much more easily than it stretches is a braid.
-        let look = ThreadLook { braided: rod.material().bend_scale < 0.5, ..ThreadLook::of(i) };
-        world.spawn((Thread::of(handle).looking(look), Name::new(name), Prop(i)));
-    }
+    world.spawn_batch(threads_from(&runner, 0));
     for (i, (name, handle)) in runner.shapes().enumerate() {
         world.spawn((Body::of(handle), Name::new(name.to_owned()), Prop(i)));
     }
     world.insert_resource(Sutura::of(Play(runner)));
+}
+
+/// The threads of a scene that is played, from a number on.
+fn threads_from(runner: &Runner, first: usize) -> Vec<(Thread, Name, Prop)> {
+    let thread = |(i, (name, handle)): (usize, (&str, Handle<Rod>))| {
+        let rod = runner.world().rod(handle).ok()?;
+        // What bends much more easily than it stretches is a braid.
+        let look = ThreadLook { braided: rod.material().bend_scale < 0.5, ..ThreadLook::of(i) };
+        Some((Thread::of(handle).looking(look), Name::new(name.to_owned()), Prop(i)))
+    };
+    runner.threads().enumerate().skip(first).filter_map(thread).collect()
 }
 
 /// A recording from its beginning.
@@ -169,7 +173,8 @@ fn replay(world: &mut World, trajectory: Trajectory) {
     let Trajectory { header, frames } = trajectory;
     for (i, thread) in header.threads.iter().enumerate() {
         let strand = Strand {
-            skin: skin(thread, &frames[0].positions[i]),
+            // A part that is cut off later has no positions yet.
+            skin: skin(thread, frames.iter().find_map(|f| f.positions.get(i)).map_or(&[][..], Vec::as_slice)),
             positions: Vec::new(),
             orientations: Vec::new(),
             tensions: Vec::new(),
@@ -220,9 +225,14 @@ pub(crate) fn place(p: [f32; 3]) -> DVec3 {
     DVec3::from_array(p.map(f64::from))
 }
 
-/// Remembers each frame of physics.
-pub fn remember(mut stage: ResMut<Stage>, sutura: Res<Sutura>) {
+/// Remembers each frame of physics, and brings threads that were cut off in it.
+pub fn remember(mut commands: Commands, mut stage: ResMut<Stage>, sutura: Res<Sutura>) {
     if let Some(play) = sutura.simulation::<Play>() {
+        let known = stage.header.threads.len();
+        if play.0.threads().count() > known {
+            stage.header.threads.extend(play.0.header().threads.into_iter().skip(known));
+            commands.spawn_batch(threads_from(&play.0, known));
+        }
         let mut frame = play.0.frame();
         // When the scene is over its own time stands still, the world's does not.
         if play.0.now().finished {
@@ -236,7 +246,13 @@ pub fn remember(mut stage: ResMut<Stage>, sutura: Res<Sutura>) {
 pub fn show_past(stage: Res<Stage>, mut strands: Query<(&Prop, &mut Strand)>, mut solids: Query<(&Prop, &mut Solid)>) {
     let Some(frame) = stage.shown() else { return };
     for (prop, mut strand) in &mut strands {
-        let (Some(x), Some(q)) = (frame.positions.get(prop.0), frame.orientations.get(prop.0)) else { continue };
+        let (Some(x), Some(q)) = (frame.positions.get(prop.0), frame.orientations.get(prop.0)) else {
+            // It is cut off later.
+            strand.positions.clear();
+            strand.orientations.clear();
+            strand.tensions.clear();
+            continue;
+        };
         if q.len() != strand.skin.lengths.len() {
             // A reel was at work: lengths are those between the particles.
             strand.skin.lengths = x.windows(2).map(|w| place(w[0]).distance(place(w[1])).max(1e-9)).collect();

@@ -150,7 +150,7 @@ impl Session {
         self.read();
     }
 
-    /// Edits of welds, reels and closed threads, and of the integrator.
+    /// Edits of welds, reels and closed threads, cuts, and the integrator.
     fn edit_joined(&mut self, which: u8, input: &mut Input<'_>) {
         match which {
             240..=242 => self.branch(input),
@@ -212,6 +212,14 @@ impl Session {
                 }
             }
             254 => self.remake(input),
+            255 if self.world.view().rods().count() < MOST_THREADS => {
+                if let Some(rod) = pick(&self.rods, input)
+                    && let Ok(cut) = self.world.cut(rod, place(input))
+                {
+                    self.rods.extend(cut.rest);
+                    self.loads.extend(cut.loads.iter().map(|(_, on_rest)| *on_rest));
+                }
+            }
             _ => self.step(input),
         }
     }

@@ -90,6 +90,7 @@ fn simulate(mut runner: Runner, mut exporter: Exporter, quiet: bool, to: f64) ->
     let mut finished = false;
     loop {
         if exporter.wants(runner.time()) {
+            exporter.follow(&runner);
             exporter.add(&Moment::of_runner(&runner))?;
         }
         if finished || runner.time() >= to {

@@ -160,6 +160,7 @@ pub struct Exporter {
     header: Header,
     options: Options,
     out: Output,
+    looks: Looks,
     writer: Option<Box<dyn Writer>>,
     format: Format,
     /// Number of the next moment by the rate.
@@ -170,8 +171,14 @@ pub struct Exporter {
 
 /// A kind of file as it is written.
 trait Writer {
-    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError>;
-    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError>;
+    fn add(&mut self, seen: &Seen<'_>, moment: &Moment, out: &mut Output) -> Result<(), ExportError>;
+    fn finish(self: Box<Self>, seen: &Seen<'_>, out: &mut Output) -> Result<(), ExportError>;
+}
+
+/// What there is to write, so far.
+struct Seen<'a> {
+    header: &'a Header,
+    looks: &'a Looks,
 }
 
 /// Writes files and counts their bytes.
@@ -180,7 +187,8 @@ struct Output {
     bytes: u64,
 }
 
-/// What the threads and shapes of a recording look like.
+/// What the threads and shapes of a recording look like: of the threads those that have come.
+#[derive(Default)]
 struct Looks {
     skins: Vec<Skin>,
     shapes: Vec<TriangleMesh>,
@@ -205,7 +213,8 @@ impl Exporter {
         let out = Output { path: out.to_path_buf(), bytes: 0 };
         // Now, so that what cannot be written is found before the work.
         out.prepare(format)?;
-        Ok(Exporter { header: header.clone(), options, out, writer: None, format, due: 0, moments: 0, seen: None })
+        let (header, looks) = (header.clone(), Looks::default());
+        Ok(Exporter { header, options, out, looks, writer: None, format, due: 0, moments: 0, seen: None })
     }
 
     /// Whether a moment of this time is to be added: the first one at or after each multiple of the period.
@@ -226,22 +235,26 @@ impl Exporter {
         true
     }
 
-    /// Adds a moment. Its threads and shapes are those of the header.
+    /// Takes note of threads of a run under way that have come since.
+    pub fn follow(&mut self, runner: &Runner) {
+        let known = self.header.threads.len();
+        if runner.rods().count() > known {
+            self.header.threads.extend(runner.header().threads.into_iter().skip(known));
+        }
+    }
+
+    /// Adds a moment. Its threads are the first ones of the header, its shapes all of them.
     pub fn add(&mut self, moment: &Moment) -> Result<(), ExportError> {
         self.moments += 1;
-        let writer = match &mut self.writer {
-            Some(writer) => writer,
-            None => {
-                let looks = || Looks::new(&self.header, moment, &self.options);
-                self.writer.insert(match self.format {
-                    Format::Glb => Box::new(glb::Glb::new(looks()?, &self.header, self.options.up)),
-                    Format::Vtk => Box::new(vtk::Vtk::new(looks()?)),
-                    Format::Obj => Box::new(obj::Obj::new(looks()?, &self.header)),
-                    Format::Csv => Box::new(csv::Csv::new()),
-                })
-            }
-        };
-        writer.add(&self.header, moment, &mut self.out)
+        self.looks.follow(&self.header, moment, &self.options)?;
+        let seen = Seen { header: &self.header, looks: &self.looks };
+        let writer = self.writer.get_or_insert_with(|| match self.format {
+            Format::Glb => Box::new(glb::Glb::new(self.options.up)),
+            Format::Vtk => Box::new(vtk::Vtk::new()),
+            Format::Obj => Box::new(obj::Obj::new()),
+            Format::Csv => Box::new(csv::Csv::new()),
+        });
+        writer.add(&seen, moment, &mut self.out)
     }
 
     /// Writes what is left to write.
@@ -250,7 +263,7 @@ impl Exporter {
             let (first, last) = self.seen.unwrap_or((0.0, 0.0));
             return Err(ExportError::Nothing { from: self.options.from, to: self.options.to, first, last });
         };
-        writer.finish(&mut self.out)?;
+        writer.finish(&Seen { header: &self.header, looks: &self.looks }, &mut self.out)?;
         Ok(Written { moments: self.moments, bytes: self.out.bytes })
     }
 }
@@ -313,20 +326,27 @@ impl Output {
 }
 
 impl Looks {
-    fn new(header: &Header, first: &Moment, options: &Options) -> Result<Self, ExportError> {
-        let mut skins = Vec::new();
-        for (thread, strand) in header.threads.iter().zip(&fitted(header, first).threads) {
-            let spec = SkinSpec { sides: options.sides, rings: options.rings, ..tube(thread, strand) };
-            skins.push(Skin::new(&spec).map_err(|source| ExportError::Tube { thread: thread.name.clone(), source })?);
+    /// Takes up what a moment has that was not there before.
+    fn follow(&mut self, header: &Header, moment: &Moment, options: &Options) -> Result<(), ExportError> {
+        if self.shapes.is_empty() {
+            // A plane reaches three times as far as the threads at the beginning, where there are none as the shapes.
+            let shapes = moment.shapes.iter().map(|s| &s.position).filter(|_| moment.threads.is_empty());
+            let points = || moment.threads.iter().flat_map(|t| &t.positions).chain(shapes.clone());
+            let shape = |(shape, pose): (&crate::trajectory::Shape, &Pose)| {
+                let reach = points().map(|x| (*x - pose.position).length()).fold(1e-2, f64::max);
+                shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 3.0 * reach)
+            };
+            self.shapes = header.shapes.iter().zip(&moment.shapes).map(shape).collect();
         }
-        // A plane reaches three times as far as the threads at the beginning, where there are none as the shapes.
-        let shapes = first.shapes.iter().map(|s| &s.position).filter(|_| first.threads.is_empty());
-        let points = || first.threads.iter().flat_map(|t| &t.positions).chain(shapes.clone());
-        let shape = |(shape, pose): (&crate::trajectory::Shape, &Pose)| {
-            let reach = points().map(|x| (*x - pose.position).length()).fold(1e-2, f64::max);
-            shape_mesh(&Geometry::from(&shape.outline), SHAPE_SIDES, 3.0 * reach)
-        };
-        Ok(Looks { skins, shapes: header.shapes.iter().zip(&first.shapes).map(shape).collect() })
+        let known = self.skins.len();
+        if moment.threads.len() > known {
+            for (thread, strand) in header.threads.iter().zip(&fitted(header, moment).threads).skip(known) {
+                let spec = SkinSpec { sides: options.sides, rings: options.rings, ..tube(thread, strand) };
+                let skin = Skin::new(&spec);
+                self.skins.push(skin.map_err(|source| ExportError::Tube { thread: thread.name.clone(), source })?);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -13,6 +13,7 @@ mod expr;
 mod judge;
 mod load;
 mod motion;
+mod parted;
 pub mod presets;
 mod report;
 mod runner;

@@ -1,6 +1,7 @@
 //! From the text of a scene to the checked scene: the only reader of the format in `docs/formats.md`.
 
 mod bodies;
+mod cuts;
 mod happening;
 mod things;
 mod watching;
@@ -10,8 +11,9 @@ use crate::doc::{Doc, Location, Table, Value};
 use crate::error::{SceneError, suggest};
 use crate::expr::{At, Expr, Kind, Named, Names, Read, is_name, texts_match};
 use crate::motion::{Ease, Goal, Key, Plan, Relative, Turning, When};
+use crate::parted::Parting;
 use crate::presets;
-use crate::saved::SavedFile;
+use crate::saved::{Event, SavedFile};
 use crate::scene::{
     Action, BodyDef, Camera, CheckDef, End, Late, LoadDef, MOST_FRAMES, Moment, Mover, Phase, ProbeDef, ProfileDef,
     ReelDef, Scene, ShapeDef, Span, Step, Strength, Take, ThreadDef, Wanted, WeldDef, engine_place,
@@ -25,6 +27,7 @@ use sutura::{
     ReelLaw, RestShape, RodSpec, Section, Settings, ShapeMotion, ShapeSpec, Shear, Solver, Stretch, SweepOrder,
     WeldRest, transported_frames,
 };
+use things::rest_lengths;
 
 /// Reads a scene with some of its values set from outside (path and value); every problem found is in the error.
 pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Result<Scene, SceneError> {
@@ -47,6 +50,8 @@ pub fn scene(text: &str, file_name: &str, settings: &[(String, String)]) -> Resu
         frame_rate: 60.0,
         surfaces: Vec::new(),
         threads: Vec::new(),
+        own_threads: 0,
+        extents: Vec::new(),
         shapes: Vec::new(),
         bodies: Vec::new(),
         reels: Vec::new(),
@@ -78,7 +83,11 @@ struct Loader<'d> {
     names: Names,
     frame_rate: f64,
     surfaces: Vec<String>,
+    /// Those of the scene, then the parts that cuts make, as the actions are read.
     threads: Vec<ThreadDef>,
+    own_threads: usize,
+    /// Of each thread, at the action that is read: rest lengths of its elements \[m\], and whether it is closed.
+    extents: Vec<(Vec<f64>, bool)>,
     shapes: Vec<ShapeDef>,
     bodies: Vec<BodyDef>,
     reels: Vec<ReelDef>,
@@ -126,6 +135,8 @@ impl<'d> Loader<'d> {
         if !root.has("thread") && !root.has("body") {
             root.problem("there is no `[[thread]]` and no `[[body]]`", None);
         }
+        self.own_threads = self.threads.len();
+        self.extents = self.threads.iter().map(|t| (rest_lengths(&t.spec), t.spec.closure.is_some())).collect();
         self.collect_names(root, start.as_ref());
         let frictions = self.friction(root);
         let mut welds = read_all(root, "weld", |t| self.weld(t));
@@ -193,6 +204,7 @@ impl<'d> Loader<'d> {
             frictions,
             solver_location,
             threads: std::mem::take(&mut self.threads),
+            own_threads: self.own_threads,
             shapes: std::mem::take(&mut self.shapes),
             bodies: std::mem::take(&mut self.bodies),
             welds,
@@ -241,6 +253,7 @@ impl<'d> Loader<'d> {
                     for load in saved.loads() {
                         self.add_load(&load);
                     }
+                    self.take_up_cuts(&saved, location);
                 }
                 Err(e) => self.doc.problem_at(location, format!("{}: {e}", path.display())),
             }
@@ -255,6 +268,7 @@ impl<'d> Loader<'d> {
                 self.add_load(&name);
             }
         }
+        self.name_parts(root);
         for phase in root.tables("phase") {
             self.phases.push(
                 phase
@@ -312,8 +326,12 @@ impl<'d> Loader<'d> {
         found
     }
     fn find_thread(&self, value: &Value<'d>) -> Option<usize> {
-        // A thread whose table had a problem has a name but no entry.
-        self.find(value, "thread", |n| if let Named::Thread(i) = n { Some(i) } else { None })
+        let found = self.find(value, "thread", |n| if let Named::Thread(i) = n { Some(i) } else { None })?;
+        if found < self.threads.len() {
+            return Some(found);
+        }
+        value.problem(format!("`{}` is not cut off yet then", value.text()?), None);
+        None
     }
     fn find_grip(&self, value: &Value<'d>) -> Option<usize> {
         self.find(value, "grip", |n| if let Named::Grip(i) = n { Some(i) } else { None })
@@ -352,7 +370,7 @@ impl<'d> Loader<'d> {
     fn thread_of(&self, table: &Table<'d>) -> Option<usize> {
         match table.get("thread") {
             Some(v) => self.find_thread(&v),
-            None if self.threads.len() == 1 => Some(0),
+            None if self.own_threads == 1 => Some(0),
             None => {
                 table.problem("`thread` is missing: which of the threads?", None);
                 None

@@ -788,7 +788,7 @@ impl Runner {
     pub fn incidents(&self) -> impl Iterator<Item = &IncidentReport> {
         self.incidents.iter().map(|(_, report)| report)
     }
-    /// The threads with their names.
+    /// The threads that are there with their names; one that is cut off comes after them.
     pub fn threads(&self) -> impl Iterator<Item = (&str, Handle<Rod>)> {
         self.scene.threads.iter().map(|t| t.name.as_str()).zip(self.stage.threads.iter().copied())
     }
@@ -829,18 +829,21 @@ impl Runner {
 
     // ---- recording ----
 
-    /// What the recording holds (for drawing while it runs).
+    /// What the recording holds (for drawing while it runs): of the threads those that are there. A thread that is cut
+    /// off comes after them.
     pub fn header(&self) -> Header {
-        let thread = |(t, r): (&crate::scene::ThreadDef, RodView<'_>)| {
+        let thread = |(k, (t, r)): (usize, (&crate::scene::ThreadDef, RodView<'_>))| {
             let (lengths, section, size) = (r.rest_lengths().to_vec(), r.cross_section().into(), r.size().0.clone());
-            let look = Some(ThreadLook { lengths, section, size, seam: r.seam_turn() });
+            // What will be open is drawn with two ends from the beginning.
+            let seam = r.seam_turn().filter(|_| !self.scene.cuts(Some(k)));
+            let look = Some(ThreadLook { lengths, section, size, seam });
             Thread { name: t.name.clone(), radius: t.spec.radius, elements: r.n_elements(), look }
         };
         Header {
             scene: self.scene.name.clone(),
             version: env!("CARGO_PKG_VERSION").into(),
             frame_rate: self.scene.frame_rate,
-            threads: self.scene.threads.iter().zip(self.stage.rods()).map(thread).collect(),
+            threads: self.scene.threads.iter().zip(self.stage.rods()).enumerate().map(thread).collect(),
             shapes: self
                 .scene
                 .shapes
@@ -900,8 +903,15 @@ impl Runner {
         }
     }
     fn record(&mut self) {
-        let mut frame = self.frame();
-        frame.fit(&self.trajectory.header);
+        let (mut frame, known) = (self.frame(), self.trajectory.header.threads.len());
+        if frame.positions.len() > known {
+            let now = self.header().threads;
+            self.trajectory.header.threads.extend(now.into_iter().skip(known));
+        }
+        // A part is as long as it is.
+        if !self.scene.cuts(None) {
+            frame.fit(&self.trajectory.header);
+        }
         self.trajectory.frames.push(frame);
     }
 
@@ -987,9 +997,8 @@ impl Runner {
     }
 
     fn thread_reports(&self) -> Vec<ThreadReport> {
-        let one = |(i, def): (usize, &crate::scene::ThreadDef)| {
-            let handle = self.stage.threads[i];
-            let rod = self.stage.world.rod(handle).ok();
+        let one = |(i, (def, handle)): (usize, (&crate::scene::ThreadDef, &Handle<Rod>))| {
+            let rod = self.stage.world.rod(*handle).ok();
             let audited = self.stage.judge.max_elongation(handle.index());
             ThreadReport {
                 name: def.name.clone(),
@@ -1001,7 +1010,7 @@ impl Runner {
                 knot: def.knot.then(|| self.stage.knot(i)),
             }
         };
-        self.scene.threads.iter().enumerate().map(one).collect()
+        self.scene.threads.iter().zip(&self.stage.threads).enumerate().map(one).collect()
     }
 
     fn solver_report(&self) -> SolverReport {

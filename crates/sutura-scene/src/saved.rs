@@ -12,10 +12,29 @@ use sutura::{Hold, LoadKind, Place};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Event {
-    Take { grip: String, thread: String, place: SavedPlace, hold: SavedHold },
-    LetGo { grip: String },
-    Load { load: String, thread: String, kind: SavedLoad },
-    Unload { load: String },
+    Take {
+        grip: String,
+        thread: String,
+        place: SavedPlace,
+        hold: SavedHold,
+    },
+    LetGo {
+        grip: String,
+    },
+    Load {
+        load: String,
+        thread: String,
+        kind: SavedLoad,
+    },
+    Unload {
+        load: String,
+    },
+    /// `part` names the rest, which a closed thread has not.
+    Cut {
+        thread: String,
+        particle: u32,
+        part: Option<String>,
+    },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

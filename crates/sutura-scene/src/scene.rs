@@ -31,7 +31,10 @@ pub struct Scene {
     pub(crate) settings: Settings,
     pub(crate) frictions: Vec<(u32, u32, Friction, Location)>,
     pub(crate) solver_location: Location,
+    /// Those of its own, then the parts that cuts make, in the order in which they come.
     pub(crate) threads: Vec<ThreadDef>,
+    /// Number of its own.
+    pub(crate) own_threads: usize,
     /// Those of their own, then those of the bodies.
     pub(crate) shapes: Vec<ShapeDef>,
     pub(crate) bodies: Vec<BodyDef>,
@@ -207,6 +210,12 @@ pub(crate) enum Action {
     Remake {
         thread: usize,
         change: Remake,
+    },
+    /// `part` is the rest, which a closed thread has not.
+    Cut {
+        thread: usize,
+        place: Place,
+        part: Option<usize>,
     },
 }
 
@@ -403,6 +412,12 @@ impl Scene {
     /// Frames per second.
     pub fn frame_rate(&self) -> f64 {
         self.frame_rate
+    }
+    /// Whether it cuts a thread; `None` asks for any.
+    pub(crate) fn cuts(&self, which: Option<usize>) -> bool {
+        let cut = |step: &Step| matches!(step.action, Action::Cut { thread, .. } if which.is_none_or(|w| w == thread));
+        let taken_up = which.is_none() && self.threads.len() > self.own_threads;
+        taken_up || self.phases.iter().flat_map(|p| &p.actions).any(cut)
     }
     /// Longest simulated time that it can take \[s\], as far as it is known beforehand; shorter when conditions end
     /// phases early.

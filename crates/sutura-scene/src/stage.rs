@@ -6,6 +6,7 @@ use crate::error::SceneError;
 use crate::expr::{At, Live, Read, Ref, Value};
 use crate::judge::{self, Judge};
 use crate::motion::{Motion, quintic};
+use crate::parted::Parting;
 use crate::report::KnotReport;
 use crate::saved::{Event, SavedFile};
 use crate::scene::{Action, LoadDef, Mover, Scene, Step};
@@ -30,9 +31,11 @@ struct Held {
 }
 
 /// A load that acts.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct Acting {
     handle: Handle<Load>,
+    /// Those of a uniform load on the parts that were cut off since.
+    also: Vec<Handle<Load>>,
     thread: usize,
     kind: LoadDef,
 }
@@ -143,6 +146,7 @@ pub fn lesser(a: Option<f64>, b: Option<f64>) -> Option<f64> {
 /// The world with its names.
 pub struct Stage {
     pub world: Recorder,
+    /// Those that are there: parts come when they are cut off, in the order of the scene.
     pub threads: Vec<Handle<Rod>>,
     /// Those of their own, then those of the bodies, as in the scene.
     pub shapes: Vec<Handle<Shape>>,
@@ -192,7 +196,7 @@ impl Stage {
         // Every thread, shape and body is tried, so that all problems show at once.
         let mut problems = Vec::new();
         let (mut threads, mut shapes, mut bodies) = (Vec::new(), Vec::new(), Vec::new());
-        for thread in &scene.threads {
+        for thread in &scene.threads[..scene.own_threads] {
             match world.insert_rod(&thread.spec) {
                 Ok(h) => threads.push(h),
                 Err(e) => problems.push(thread.location.problem(e.to_string())),
@@ -292,6 +296,11 @@ impl Stage {
                     let (load, thread) = (find(&self.names.loads, load)?, find(&self.names.threads, thread)?);
                     self.set_load(load, thread, from_kind((*kind).into())).map_err(|e| e.to_string())?;
                 }
+                Event::Cut { thread, particle, part } => {
+                    let thread = find(&self.names.threads, thread)?;
+                    let part = part.as_ref().map(|part| find(&self.names.threads, part)).transpose()?;
+                    self.cut(thread, Place::Particle(*particle), part).map_err(|e| e.to_string())?;
+                }
                 Event::Unload { load } => self.unload(find(&self.names.loads, load)?).map_err(|e| e.to_string())?,
             }
         }
@@ -348,7 +357,7 @@ impl Stage {
                 if *ramp <= 0.0 {
                     return self.set_load(*load, *thread, *kind);
                 }
-                let from = match self.loads[*load] {
+                let from = match &self.loads[*load] {
                     Some(acting) if acting.thread == *thread && same_kind(&acting.kind, kind) => acting.kind,
                     _ => scaled(kind, 0.0),
                 };
@@ -365,7 +374,7 @@ impl Stage {
                 self.unload(*load)
             }
             Action::Mark { thread } => {
-                self.marks[*thread] = judge::entries(&self.world.rod(self.threads[*thread])?);
+                self.marks[*thread] = judge::entries(&self.world.rod(self.thread(*thread)?)?);
                 Ok(())
             }
             Action::Gravity { value, ramp } => {
@@ -400,10 +409,11 @@ impl Stage {
                 s.tolerance = tolerance.unwrap_or(s.tolerance);
                 self.world.set_settings(s)
             }
+            Action::Cut { thread, place, part } => self.cut(*thread, *place, *part),
             Action::Reel { reel, law } => self.world.set_reel(self.reels[*reel], *law),
             Action::Friction { a, b, friction } => self.world.set_friction(*a, *b, *friction),
             Action::Remake { thread, change } => {
-                let rod = self.threads[*thread];
+                let rod = self.thread(*thread)?;
                 let material = change.of(self.world.rod(rod)?.material());
                 self.world.set_material(rod, &material)?;
                 change.stretch.map_or(Ok(()), |stretch| self.world.set_stretch(rod, stretch))
@@ -416,7 +426,7 @@ impl Stage {
             self.let_go(grip)?;
         }
         let handle =
-            self.world.insert_grip(&GripSpec { rod: self.threads[thread], place, hold, drive: Drive::Pose, ramp })?;
+            self.world.insert_grip(&GripSpec { rod: self.thread(thread)?, place, hold, drive: Drive::Pose, ramp })?;
         let taken = self.world.grip_pose(handle)?;
         self.grips[grip] = Some(Held { handle, thread, place, taken });
         let (grip, thread) = (self.names.grips[grip].clone(), self.names.threads[thread].clone());
@@ -435,13 +445,15 @@ impl Stage {
     fn set_load(&mut self, load: usize, thread: usize, kind: LoadDef) -> Result<(), Error> {
         match &mut self.loads[load] {
             Some(acting) if acting.thread == thread => {
-                self.world.set_load(acting.handle, to_kind(kind))?;
+                for handle in std::iter::once(acting.handle).chain(acting.also.iter().copied()) {
+                    self.world.set_load(handle, to_kind(kind))?;
+                }
                 acting.kind = kind;
             }
             _ => {
                 self.unload(load)?;
-                let handle = self.world.insert_load(&LoadSpec { rod: self.threads[thread], kind: to_kind(kind) })?;
-                self.loads[load] = Some(Acting { handle, thread, kind });
+                let handle = self.world.insert_load(&LoadSpec { rod: self.thread(thread)?, kind: to_kind(kind) })?;
+                self.loads[load] = Some(Acting { handle, also: Vec::new(), thread, kind });
             }
         }
         // Only the last value counts for a saved state.
@@ -456,10 +468,66 @@ impl Stage {
     }
     fn unload(&mut self, load: usize) -> Result<(), Error> {
         if let Some(acting) = self.loads[load].take() {
-            self.world.remove_load(acting.handle)?;
+            for handle in std::iter::once(acting.handle).chain(acting.also) {
+                self.world.remove_load(handle)?;
+            }
             self.events.push(Event::Unload { load: self.names.loads[load].clone() });
         }
         Ok(())
+    }
+    /// Cuts a thread; what the scene knows of places on it goes with them.
+    fn cut(&mut self, thread: usize, place: Place, part: Option<usize>) -> Result<(), Error> {
+        let handle = self.thread(thread)?;
+        let rod = self.world.rod(handle)?;
+        let (lengths, closed) = (rod.rest_lengths().to_vec(), rod.is_closed());
+        if closed == part.is_some() {
+            let value = if closed { "closed" } else { "open" }.into();
+            let wanted = "a thread that ends where the scene has its ends";
+            return Err(Error::Invalid { what: "cut", field: "thread".into(), value, wanted });
+        }
+        let cut = self.world.cut(handle, place)?;
+        let parting = Parting { lengths, closed, particle: cut.particle as usize };
+        self.threads.extend(cut.rest);
+        match part {
+            Some(_) => self.marks.push(None),
+            // It is counted from another start now.
+            None => self.marks[thread] = None,
+        }
+        let of = |on_rest: bool| part.filter(|_| on_rest).unwrap_or(thread);
+        for held in self.grips.iter_mut().flatten().filter(|h| h.thread == thread) {
+            let (on_rest, place) = parting.carry(held.place);
+            (held.thread, held.place) = (of(on_rest), place);
+        }
+        let carry = |kind: &mut LoadDef| {
+            let (LoadDef::Point { place, .. } | LoadDef::Mass { place, .. }) = kind else { return false };
+            let (on_rest, now) = parting.carry(*place);
+            *place = now;
+            on_rest
+        };
+        for ramp in &mut self.ramps {
+            if let Growing::Load { load, from, to } = &mut ramp.what
+                && self.loads[*load].as_ref().is_some_and(|acting| acting.thread == thread)
+            {
+                carry(from);
+                carry(to);
+            }
+        }
+        for acting in self.loads.iter_mut().flatten() {
+            if acting.thread == thread {
+                acting.thread = of(carry(&mut acting.kind));
+            }
+            let shared = cut.loads.iter().filter(|(here, _)| *here == acting.handle || acting.also.contains(here));
+            let shared: Vec<_> = shared.map(|(_, there)| *there).collect();
+            acting.also.extend(shared);
+        }
+        let name = |k: usize| self.names.threads[k].clone();
+        let event = Event::Cut { thread: name(thread), particle: cut.particle, part: part.map(name) };
+        self.events.push(event);
+        Ok(())
+    }
+    /// A thread that is there.
+    fn thread(&self, thread: usize) -> Result<Handle<Rod>, Error> {
+        self.threads.get(thread).copied().ok_or(Error::StaleHandle { what: "rod" })
     }
     fn set_gravity(&mut self, gravity: DVec3) -> Result<(), Error> {
         let settings = sutura::Settings { gravity, ..self.world.settings().clone() };
@@ -642,7 +710,7 @@ impl Stage {
             let s = quintic((time - ramp.begin) / ramp.span);
             let set = match &ramp.what {
                 Growing::Gravity { from, to } => self.set_gravity(from.lerp(*to, s)),
-                Growing::Load { load, from, to } => match self.loads[*load] {
+                Growing::Load { load, from, to } => match &self.loads[*load] {
                     Some(acting) => self.set_load(*load, acting.thread, between(from, to, s)),
                     None => Ok(()),
                 },
@@ -676,8 +744,8 @@ impl Stage {
 
     // ---- reading ----
 
-    fn rod(&self, thread: usize) -> Option<RodView<'_>> {
-        self.world.rod(self.threads[thread]).ok()
+    pub fn rod(&self, thread: usize) -> Option<RodView<'_>> {
+        self.world.rod(*self.threads.get(thread)?).ok()
     }
     pub fn rods(&self) -> impl Iterator<Item = RodView<'_>> {
         (0..self.threads.len()).filter_map(|i| self.rod(i))

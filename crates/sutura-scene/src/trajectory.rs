@@ -22,7 +22,7 @@ pub struct Header {
     pub version: String,
     /// Frames per second of the simulation.
     pub frame_rate: f64,
-    /// The threads, in the order of the frames.
+    /// The threads, in the order of the frames. Those that are cut off in the run come last, in the order of time.
     pub threads: Vec<Thread>,
     /// The shapes, in the order of the frames.
     pub shapes: Vec<Shape>,
@@ -37,7 +37,8 @@ pub struct Thread {
     pub name: String,
     /// Radius \[m\].
     pub radius: f64,
-    /// Elements n; a frame has n + 1 positions and n orientations.
+    /// Elements n; a frame has n + 1 positions and n orientations. Where threads are cut it is the number when the
+    /// thread came, and each frame has those of its own.
     pub elements: usize,
     /// What it looks like; recordings of earlier versions have none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -182,7 +183,7 @@ impl From<&ShapeOutline> for Geometry {
 pub struct Frame {
     /// Simulated time \[s\].
     pub time: f64,
-    /// Particle positions of each thread \[m\].
+    /// Particle positions of each thread that is there: the first ones of the header \[m\].
     pub positions: Vec<Vec<[f32; 3]>>,
     /// Material frames of each thread, `world_from_material` as x, y, z, w.
     pub orientations: Vec<Vec<[f32; 4]>>,
@@ -282,8 +283,11 @@ impl<'a> IntoIterator for &'a Trajectory {
 }
 
 const MAGIC: &[u8; 8] = b"SUTURATR";
-/// Version 1 has no forces.
-const VERSION: u32 = 2;
+/// Version 1 has no forces; version 3 says of each frame which threads are there, and of how many elements. What needs
+/// no version 3 is written as version 2.
+const VERSION: u32 = 3;
+/// See [`VERSION`].
+const OF_HEADER: u32 = 2;
 
 /// Bytes of a contact.
 const CONTACT: usize = 64;
@@ -293,13 +297,18 @@ impl Trajectory {
     pub fn to_bytes(&self) -> Vec<u8> {
         let header = serde_json::to_vec(&self.header).unwrap_or_default();
         let mut out = MAGIC.to_vec();
-        out.extend_from_slice(&VERSION.to_le_bytes());
+        let version = if self.frames.iter().all(|f| f.is_of(&self.header)) { OF_HEADER } else { VERSION };
+        out.extend_from_slice(&version.to_le_bytes());
         out.extend_from_slice(&(header.len() as u32).to_le_bytes());
         out.extend_from_slice(&header);
         out.extend_from_slice(&(self.frames.len() as u64).to_le_bytes());
         let put = |v: f32, out: &mut Vec<u8>| out.extend_from_slice(&v.to_le_bytes());
         for frame in &self.frames {
             out.extend_from_slice(&frame.time.to_le_bytes());
+            if version > OF_HEADER {
+                out.extend_from_slice(&(frame.orientations.len() as u32).to_le_bytes());
+                frame.orientations.iter().for_each(|q| out.extend_from_slice(&(q.len() as u32).to_le_bytes()));
+            }
             for (x, q) in frame.positions.iter().zip(&frame.orientations) {
                 x.iter().flatten().for_each(|v| put(*v, &mut out));
                 q.iter().flatten().for_each(|v| put(*v, &mut out));
@@ -367,12 +376,16 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    /// Bytes of a frame without forces, by the header; `None` where they are beyond counting.
+    /// Bytes of a frame without forces, by the header, from version 3 on also without threads; `None` where they are
+    /// beyond counting.
     fn frame_bytes(&self, version: u32) -> Option<u64> {
         // The counts of shapes and grips are those of what was read, so their bytes are few.
         let mut sum = if version == 1 { 8 } else { 12 }
             + 28 * self.header.shapes.len() as u64
             + 12 * self.header.grips.len() as u64;
+        if version > OF_HEADER {
+            return Some(sum + 4);
+        }
         for t in &self.header.threads {
             sum = sum.checked_add((t.elements as u64).checked_mul(28)?.checked_add(12)?)?;
         }
@@ -386,6 +399,11 @@ impl Frame {
         let poses = self.shapes.iter().flat_map(|(x, q)| x.iter().chain(q));
         let mut numbers = points.chain(self.orientations.iter().flatten().flatten()).chain(poses);
         self.time.is_finite() && numbers.all(|v| v.is_finite()) && self.forces.as_ref().is_none_or(Forces::is_finite)
+    }
+
+    /// Whether its threads are those of the header, with as many elements.
+    fn is_of(&self, header: &Header) -> bool {
+        header.threads.iter().map(|t| t.elements).eq(self.orientations.iter().map(Vec::len))
     }
 
     /// Gives threads that a reel has made longer or shorter as many elements as the header says: points at equal parts
@@ -504,10 +522,9 @@ impl<'a> Reader<'a> {
     fn place(&mut self) -> Option<OnThread> {
         Some(OnThread { thread: self.u32()?, element: self.u32()?, s: f32::from_le_bytes(self.array()?) })
     }
-    /// `None` also where it is on a thread or shape that is not there.
-    fn contact(&mut self, header: &Header) -> Option<Contact> {
-        let is_there =
-            |p: &OnThread| header.threads.get(p.thread as usize).is_some_and(|t| (p.element as usize) < t.elements);
+    /// `None` also where it is on a thread, of these numbers of elements, or on a shape that is not there.
+    fn contact(&mut self, header: &Header, elements: &[usize]) -> Option<Contact> {
+        let is_there = |p: &OnThread| elements.get(p.thread as usize).is_some_and(|n| (p.element as usize) < *n);
         let (on, other, kind) = (self.place()?, self.place()?, self.u32()?);
         let with = match kind & 1 {
             0 => Touched::Thread(Some(other).filter(is_there)?),
@@ -516,10 +533,10 @@ impl<'a> Reader<'a> {
         let (point, normal, force) = (self.f32s()?, self.f32s()?, self.f32s()?);
         Some(Contact { on: Some(on).filter(is_there)?, with, point, normal, force, sliding: kind & 2 != 0 })
     }
-    fn forces(&mut self, header: &Header) -> Option<Forces> {
+    fn forces(&mut self, header: &Header, elements: &[usize]) -> Option<Forces> {
         let mut forces = Forces::default();
-        for thread in &header.threads {
-            let bytes = self.take(thread.elements.checked_mul(4)?)?;
+        for n in elements {
+            let bytes = self.take(n.checked_mul(4)?)?;
             forces.tensions.push(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect());
         }
         for _ in &header.grips {
@@ -529,14 +546,26 @@ impl<'a> Reader<'a> {
         if count > (self.bytes.len() - self.at) / CONTACT {
             return None;
         }
-        forces.contacts = (0..count).map(|_| self.contact(header)).collect::<Option<_>>()?;
+        forces.contacts = (0..count).map(|_| self.contact(header, elements)).collect::<Option<_>>()?;
         Some(forces)
+    }
+    /// Numbers of elements of the threads that are there.
+    fn elements(&mut self, header: &Header, version: u32) -> Option<Vec<usize>> {
+        if version <= OF_HEADER {
+            return Some(header.threads.iter().map(|t| t.elements).collect());
+        }
+        let count = self.u32()? as usize;
+        if count > header.threads.len() {
+            return None;
+        }
+        (0..count).map(|_| self.u32().map(|n| n as usize).filter(|n| *n > 0)).collect()
     }
     fn frame(&mut self, header: &Header, version: u32) -> Option<Frame> {
         let mut frame = Frame { time: f64::from_le_bytes(self.array()?), ..Frame::default() };
-        for thread in &header.threads {
-            frame.positions.push((0..=thread.elements).map(|_| self.f32s()).collect::<Option<_>>()?);
-            frame.orientations.push((0..thread.elements).map(|_| self.f32s()).collect::<Option<_>>()?);
+        let elements = self.elements(header, version)?;
+        for n in &elements {
+            frame.positions.push((0..=*n).map(|_| self.f32s()).collect::<Option<_>>()?);
+            frame.orientations.push((0..*n).map(|_| self.f32s()).collect::<Option<_>>()?);
         }
         for _ in &header.shapes {
             frame.shapes.push((self.f32s()?, self.f32s()?));
@@ -548,7 +577,7 @@ impl<'a> Reader<'a> {
         if version > 1 {
             frame.forces = match self.u32()? {
                 0 => None,
-                1 => Some(self.forces(header)?),
+                1 => Some(self.forces(header, &elements)?),
                 _ => return None,
             };
         }
@@ -624,6 +653,42 @@ mod tests {
         old[8] = 1;
         old.extend_from_slice(&crc32fast::hash(&old).to_le_bytes());
         assert_eq!(Trajectory::from_bytes(&old).unwrap(), t);
+    }
+
+    /// A second thread comes in the second frame, of which the first one has an element less.
+    fn cut() -> Trajectory {
+        let mut t = sample();
+        t.header.threads.push(Thread { name: "a.cut".into(), elements: 1, look: None, ..t.header.threads[0].clone() });
+        let frame = &mut t.frames[1];
+        frame.positions = vec![vec![[0.0, 0.5, 0.0]; 2]; 2];
+        frame.orientations = vec![vec![[0.0, 0.0, 0.0, 1.0]; 1]; 2];
+        let forces = frame.forces.as_mut().unwrap();
+        forces.tensions = vec![vec![0.5], vec![0.25]];
+        forces.contacts[1].with = Touched::Thread(OnThread { thread: 1, element: 0, s: 0.5 });
+        t
+    }
+
+    #[test]
+    fn threads_that_come_and_lose_elements_read_back() {
+        let t = cut();
+        let bytes = t.to_bytes();
+        assert_eq!((bytes[8], sample().to_bytes()[8]), (3, 2));
+        assert_eq!(Trajectory::from_bytes(&bytes).unwrap(), t);
+        // A contact with what was not there yet.
+        let mut early = t.clone();
+        early.frames[0].forces = t.frames[1].forces.clone();
+        assert!(Trajectory::from_bytes(&early.to_bytes()).is_err());
+        for n in 0..bytes.len() {
+            assert!(Trajectory::from_bytes(&bytes[..n]).is_err(), "cut at {n}");
+        }
+        // More threads than the header has, and one of no elements.
+        let at = bytes.windows(8).position(|w| w == 0.5f64.to_le_bytes()).unwrap() + 8;
+        for (offset, value) in [(0, 3u32), (4, 0), (4, u32::MAX)] {
+            let mut other = bytes[..bytes.len() - 4].to_vec();
+            other[at + offset..at + offset + 4].copy_from_slice(&value.to_le_bytes());
+            other.extend_from_slice(&crc32fast::hash(&other).to_le_bytes());
+            assert!(Trajectory::from_bytes(&other).is_err(), "{offset} {value}");
+        }
     }
 
     #[test]

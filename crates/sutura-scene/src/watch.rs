@@ -77,7 +77,7 @@ pub fn profile(def: &ProfileDef, stage: &Stage) -> Series {
         columns.extend(names.iter().map(|n| ((*n).to_owned(), (*unit).to_owned())));
     }
     let mut rows = Vec::new();
-    if let Ok(rod) = stage.world.rod(stage.threads[def.thread]) {
+    if let Some(rod) = stage.rod(def.thread) {
         let mut arc = 0.0;
         for (j, l) in rod.rest_lengths().iter().enumerate() {
             let mut row = vec![arc + 0.5 * l];

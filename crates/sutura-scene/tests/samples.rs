@@ -43,6 +43,7 @@ sample_tests!(
     hanging_helix,
     free_thread,
     capstan,
+    cut,
     rolling,
     heap
 );

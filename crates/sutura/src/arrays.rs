@@ -14,6 +14,10 @@ macro_rules! element_arrays {
             pub(crate) fn remove_entries(&mut self, entries: core::ops::Range<usize>) {
                 $(self.$array.drain(entries.clone());)*
             }
+            /// Begins the entries of a range with the one at `first`, those before it after the others.
+            pub(crate) fn rotate_entries(&mut self, entries: core::ops::Range<usize>, first: usize) {
+                $(self.$array[entries.clone()].rotate_left(first - entries.start);)*
+            }
             /// Whether each array has this many entries.
             pub(crate) fn has_entries(&self, n: usize) -> bool {
                 true $(&& self.$array.len() == n)*

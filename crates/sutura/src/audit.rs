@@ -7,14 +7,16 @@
 //! two ways have little to do with each other.)
 //!
 //! - Thread through thread: the centerlines of two elements come within a thousandth of the smaller radius. Elements
-//!   with less than `pi r` of thread between them are left out.
+//!   with less than `pi r` of thread between them are left out, and so are those beside a weld or on both sides of a
+//!   cut.
 //! - Thread through shape: the centerline is inside a solid, or comes within a thousandth of the radius of a mesh's
 //!   surface.
 //! - Clearance: (distance of centerlines - radii) / mean diameter at the states themselves, 0 touches, negative
 //!   overlaps; to a shape (distance of centerline from surface - radius) / diameter. Only what is nearer than one
 //!   diameter is looked at.
 //!
-//! A thread or shape that appears, or whose number of particles changes, is taken up from its first state on; a thread
+//! A thread or shape that appears, or whose number of particles changes, or that is a ring which was cut, is taken up from
+//! its first state on; a thread
 //! removed and replaced by one of the same size and radius in the same slot between two states cannot be told from a
 //! move.
 
@@ -112,6 +114,7 @@ struct Frame {
 #[derive(Debug, Clone, Copy)]
 struct SeenRod {
     slot: usize,
+    turned: u32,
     radius: f64,
     first: usize,
     n_particles: usize,
@@ -130,7 +133,7 @@ struct SeenShape {
     alive: bool,
 }
 
-/// Places that are joined at the state at hand: the number of the thread there and the rest arc on it, and up to which
+/// Places that are joined at the state at hand, or were until a cut: the number of the thread there and the rest arc on it, and up to which
 /// way by there elements of the threads do not touch.
 #[derive(Debug)]
 struct SeenWeld {
@@ -156,6 +159,8 @@ impl SeenWeld {
 #[derive(Debug, Clone, Copy)]
 struct RodSlice<'a> {
     slot: usize,
+    /// Changes where its particles are numbered otherwise.
+    turned: u32,
     radius: f64,
     positions: &'a [DVec3],
     rest_lengths: &'a [f64],
@@ -187,6 +192,7 @@ impl Audit {
     pub fn observe(&mut self, view: View<'_>) {
         let rods = view.rods().map(|r| RodSlice {
             slot: r.slot(),
+            turned: r.turned(),
             radius: r.radius(),
             positions: r.positions(),
             rest_lengths: r.rest_lengths(),
@@ -195,7 +201,9 @@ impl Audit {
             view.time(),
             rods,
             view.shapes(),
-            view.welds().map(|w| (w.filter_distance(), w.body(), w.places().collect())),
+            view.welds()
+                .map(|w| (w.filter_distance(), w.body(), w.places().collect()))
+                .chain(view.cuts().map(|c| (c.filter_distance(), None, c.places().to_vec()))),
         );
     }
 
@@ -235,11 +243,13 @@ impl Audit {
                 return false;
             }
             let same = |old: &&SeenRod| {
-                old.slot == rod.slot && old.n_particles == n_particles && old.radius.to_bits() == rod.radius.to_bits()
+                (old.slot, old.turned, old.n_particles) == (rod.slot, rod.turned, n_particles)
+                    && old.radius.to_bits() == rod.radius.to_bits()
             };
             let first_before = before.rods.iter().find(same).map(|old| old.first);
             now.rods.push(SeenRod {
                 slot: rod.slot,
+                turned: rod.turned,
                 radius: rod.radius,
                 first: now.position.len(),
                 n_particles,

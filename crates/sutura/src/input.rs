@@ -10,7 +10,8 @@ use crate::error::Error;
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::body::{Body, BodyMotion, BodySpec, ColliderSpec};
-use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec};
+use crate::model::cut::Cut;
+use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec, Place};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Closure, RestShape, Rod, RodSpec, Stretch};
@@ -36,6 +37,8 @@ pub enum Input {
     InsertRod(RodSpec),
     /// [`World::remove_rod`].
     RemoveRod(Handle<Rod>),
+    /// [`World::cut`].
+    Cut(Handle<Rod>, Place),
     /// [`World::set_material`].
     SetMaterial(Handle<Rod>, Material),
     /// [`World::set_stretch`].
@@ -94,6 +97,7 @@ impl Input {
             Input::Friction(a, b, friction) => world.set_friction(*a, *b, *friction)?,
             Input::InsertRod(spec) => drop(world.insert_rod(spec)?),
             Input::RemoveRod(rod) => world.remove_rod(*rod)?,
+            Input::Cut(rod, place) => drop(world.cut(*rod, *place)?),
             Input::SetMaterial(rod, material) => world.set_material(*rod, material)?,
             Input::SetStretch(rod, stretch) => world.set_stretch(*rod, *stretch)?,
             Input::InsertShape(spec) => drop(world.insert_shape(spec)?),
@@ -166,6 +170,8 @@ impl Recorder {
         insert_rod(spec: &RodSpec) -> Handle<Rod>, Input::InsertRod(spec.clone());
         /// [`World::remove_rod`].
         remove_rod(rod: Handle<Rod>) -> (), Input::RemoveRod(rod);
+        /// [`World::cut`].
+        cut(rod: Handle<Rod>, place: Place) -> Cut, Input::Cut(rod, place);
         /// [`World::set_material`].
         set_material(rod: Handle<Rod>, material: &Material) -> (), Input::SetMaterial(rod, material.clone());
         /// [`World::set_stretch`].
@@ -275,7 +281,7 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24 and 25, version 4 also
+/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24, 25 and 34, version 4 also
 /// without the input 23, version 3 also without drag and without [`ShapeSpec::open`], version 2 also without the inputs
 /// 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
@@ -537,4 +543,5 @@ variants!(Input {
     25 => RemoveBody(body),
     26 => BodyMotion(body, motion),
     27 => BodyPose(body, pose),
+    34 => Cut(rod, place),
 });

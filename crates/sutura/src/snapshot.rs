@@ -239,7 +239,7 @@ macro_rules! state {
                     state.bodies = Slots::of_values(bodies);
                     let of_bodies = Vec::<Contact>::take(input)?;
                     let all: Vec<Contact> = state.contacts.iter().copied().chain(of_bodies).collect();
-                    state.contacts = sorted(all)?;
+                    state.contacts = sorted(&all)?;
                     state.weld_force = Bytes::take(input)?;
                 }
                 Ok(state)
@@ -307,15 +307,15 @@ impl Bytes for Contacts {
         let thread = |element: u32, s: f64| Site::Thread { element, s };
         let threads = threads.into_iter().map(|(((a, b), (s, t)), rest)| contact(thread(a, s), thread(b, t), rest));
         let on = |(((shape, element), s), rest)| contact(thread(element, s), Site::Shape { shape }, rest);
-        sorted(threads.chain(shapes.into_iter().map(on)).collect())
+        sorted(&threads.chain(shapes.into_iter().map(on)).collect::<Vec<_>>())
     }
 }
 
 /// Contacts that are in the order in which they are written.
-fn sorted(all: Vec<Contact>) -> Result<Contacts, Error> {
+fn sorted(all: &[Contact]) -> Result<Contacts, Error> {
     let mut contacts = Contacts::default();
     contacts.set(all.iter().copied());
-    if contacts.iter().zip(&all).any(|(a, b)| a.order(b).is_ne()) {
+    if contacts.iter().zip(all).any(|(a, b)| a.order(b).is_ne()) {
         return Err(damaged("its contacts are out of order"));
     }
     Ok(contacts)
@@ -401,7 +401,7 @@ impl Build {
             } else if here.along != there.along {
                 "its section, modulus or density changes otherwise along it there".into()
             } else if here.rest != there.rest {
-                "its rest shape is another there".into()
+                "its rest shape is another there, or it was cut elsewhere".into()
             } else {
                 continue;
             };
@@ -445,6 +445,10 @@ impl BuiltRod {
         for side in members.iter().flat_map(|m| [m.before, m.after]).flatten().filter(|s| s.section == DQuat::IDENTITY)
         {
             side.rest_half.put(&mut rest);
+        }
+        // A cut leaves ends that do not touch each other.
+        for faces in model.faces.iter().filter(|f| f.ends.iter().any(|end| end.rod == slot)) {
+            faces.ends.iter().for_each(|end| (end.rod, end.at_end).put(&mut rest));
         }
         BuiltRod {
             slot,

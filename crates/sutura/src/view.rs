@@ -4,11 +4,12 @@
 use crate::math::{Pose, log};
 use crate::model::Model;
 use crate::model::body::{BodyModel, MassProperties};
+use crate::model::cut::Faces;
 use crate::model::material::{Material, SectionStiffness};
 use crate::model::rod::{RodModel, Stretch};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
-use crate::model::weld::WeldModel;
+use crate::model::weld::{WeldModel, rest_across};
 use crate::rod::energy::{Energy, energy};
 use crate::state::{BodyState, Moved, Site, State};
 use glam::{DQuat, DVec3};
@@ -74,6 +75,24 @@ impl<'a> WeldView<'a> {
     /// Elements of the joined threads whose way to each other through the weld is shorter than this do not touch \[m\].
     pub fn filter_distance(&self) -> f64 {
         self.weld.filter_distance
+    }
+}
+
+/// Two ends that a cut made, at one accepted state.
+#[derive(Clone, Copy)]
+pub struct CutView<'a> {
+    model: &'a Model,
+    faces: &'a Faces,
+}
+
+impl CutView<'_> {
+    /// The ends: slot of the thread and particle on it, its first or its last.
+    pub fn places(&self) -> [(usize, usize); 2] {
+        self.faces.ends.map(|end| (end.rod as usize, end.particle(self.model) as usize))
+    }
+    /// Elements whose way to each other by these ends is shorter than this do not touch \[m\].
+    pub fn filter_distance(&self) -> f64 {
+        self.faces.filter_distance
     }
 }
 
@@ -162,6 +181,11 @@ impl<'a> View<'a> {
             let k = slot as usize;
             WeldView { weld, force: state.weld_force[k], pose: Pose::new(position, state.weld_orientation[k]), slot: k }
         })
+    }
+    /// The cuts whose parts are both in the world, in the order in which they were made.
+    pub fn cuts(&self) -> impl Iterator<Item = CutView<'a>> + use<'a> {
+        let model = self.model;
+        model.faces.iter().map(move |faces| CutView { model, faces })
     }
     /// Contacts that carry force: those of threads with threads, those of threads with shapes, then those of bodies.
     pub fn contacts(&self) -> impl Iterator<Item = ContactView> + use<'a> {
@@ -269,6 +293,10 @@ impl<'a> RodView<'a> {
     /// first, and it has n joints.
     pub fn n_elements(&self) -> usize {
         self.rod.n_elements as usize
+    }
+    /// How often its particles were numbered from another one on: where a ring is cut.
+    pub(crate) fn turned(&self) -> u32 {
+        self.rod.turned
     }
     /// Whether its end is joined to its start.
     pub fn is_closed(&self) -> bool {
@@ -432,10 +460,7 @@ impl<'a> RodView<'a> {
     /// Rest rotation from the last frame of a closed thread to its first.
     fn seam_rest(&self) -> Option<DQuat> {
         let weld = self.model.welds.at(self.model.weld_of[self.rod.first as usize].filter(|_| self.is_closed())?)?;
-        let of = |particle: u32| weld.members.iter().find(|m| m.rod == self.slot && m.particle == particle);
-        let (before, after) = (of(self.rod.n_elements)?.before?, of(0)?.after?);
-        let half = before.rest_half * before.rest_half * before.section.conjugate();
-        Some(half * after.section * after.rest_half * after.rest_half)
+        rest_across(&weld.members, (self.slot, self.rod.n_elements), (self.slot, 0))
     }
     /// Mechanical energy of this thread.
     pub fn energy(&self) -> Energy {

@@ -1,7 +1,6 @@
 //! A table of positions and frames.
 
-use super::{ExportError, Moment, Output, Writer};
-use crate::trajectory::Header;
+use super::{ExportError, Moment, Output, Seen, Writer};
 
 /// Rows so far.
 pub struct Csv {
@@ -23,8 +22,8 @@ impl Csv {
 }
 
 impl Writer for Csv {
-    fn add(&mut self, header: &Header, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
-        for (thread, strand) in header.threads.iter().zip(&moment.threads) {
+    fn add(&mut self, seen: &Seen<'_>, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
+        for (thread, strand) in seen.header.threads.iter().zip(&moment.threads) {
             for (i, x) in strand.positions.iter().enumerate() {
                 // The last particle has no element after it.
                 let q = strand
@@ -39,7 +38,7 @@ impl Writer for Csv {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, _: &Seen<'_>, out: &mut Output) -> Result<(), ExportError> {
         let bytes = self.table.into_inner().expect("a table in memory");
         out.write(None, &bytes)
     }

@@ -4,8 +4,8 @@
 //! element.
 
 use super::texture::braid;
-use super::{ExportError, Looks, Moment, Output, THREAD_COLORS, Writer, fitted};
-use crate::trajectory::{Header, ShapeOutline};
+use super::{ExportError, Moment, Output, Seen, THREAD_COLORS, Writer, fitted};
+use crate::trajectory::ShapeOutline;
 use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf::json::animation::{Channel, Interpolation, Property, Sampler, Target};
 use gltf::json::buffer::{Target as Use, View};
@@ -24,13 +24,11 @@ use sutura::skin::{Bone, TriangleMesh};
 
 /// Paths of all nodes that may move.
 pub struct Glb {
-    looks: Looks,
-    threads: Vec<String>,
-    shapes: Vec<(String, bool)>,
     up: DVec3,
     times: Vec<f64>,
-    /// Of each bone of each thread, then of each shape.
-    paths: Vec<Path>,
+    /// Of each bone of each thread, and of each shape.
+    bones: Vec<Vec<Path>>,
+    shapes: Vec<Path>,
 }
 
 #[derive(Default, Clone)]
@@ -54,6 +52,16 @@ impl Path {
         self.turns.push(if against { turn.map(|v| -v) } else { turn });
     }
 
+    /// That of a bone which comes after so many moments: until then it is there without size.
+    fn unseen(bone: &Bone, moments: usize) -> Self {
+        let mut path = Path::default();
+        for _ in 0..moments {
+            path.push(bone.position.to_array(), bone.orientation.normalize().to_array());
+            path.scales.push([0.0; 3]);
+        }
+        path
+    }
+
     fn is_scaled(&self) -> bool {
         self.scales.iter().flatten().any(|s| (s - 1.0).abs() > SEEN)
     }
@@ -66,18 +74,8 @@ struct Document {
 }
 
 impl Glb {
-    pub fn new(looks: Looks, header: &Header, up: DVec3) -> Self {
-        let n: usize = looks.skins.iter().map(sutura::skin::Skin::n_bones).sum::<usize>() + looks.shapes.len();
-        // What has no inside is seen from both sides.
-        let open = |o: &ShapeOutline| matches!(o, ShapeOutline::Plane | ShapeOutline::Mesh { .. });
-        Glb {
-            threads: header.threads.iter().map(|t| t.name.clone()).collect(),
-            shapes: header.shapes.iter().map(|s| (s.name.clone(), open(&s.outline))).collect(),
-            up,
-            times: Vec::new(),
-            paths: vec![Path::default(); n],
-            looks,
-        }
+    pub fn new(up: DVec3) -> Self {
+        Glb { up, times: Vec::new(), bones: Vec::new(), shapes: Vec::new() }
     }
 
     /// One animation from time 0 on; what stays where it is has no channel.
@@ -92,7 +90,7 @@ impl Glb {
             samplers: Vec::new(),
         };
         let mut input = None;
-        for (node, path) in nodes.iter().zip(&self.paths) {
+        for (node, path) in nodes.iter().zip(self.bones.iter().flatten().chain(&self.shapes)) {
             let moves = path
                 .positions
                 .iter()
@@ -127,39 +125,42 @@ impl Glb {
 }
 
 impl Writer for Glb {
-    fn add(&mut self, header: &Header, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
-        let moment = fitted(header, moment);
+    fn add(&mut self, seen: &Seen<'_>, moment: &Moment, _: &mut Output) -> Result<(), ExportError> {
+        let moment = fitted(seen.header, moment);
+        let before = self.times.len();
         self.times.push(moment.time);
-        let mut paths = self.paths.iter_mut();
-        for (skin, strand) in self.looks.skins.iter().zip(&moment.threads) {
+        for (k, (skin, strand)) in seen.looks.skins.iter().zip(&moment.threads).enumerate() {
             let mut bones = vec![Bone::default(); skin.n_bones()];
             skin.bones_at(&strand.positions, &strand.orientations, &mut bones);
-            for (bone, path) in bones.iter().zip(&mut paths) {
+            if self.bones.len() <= k {
+                self.bones.push(bones.iter().map(|bone| Path::unseen(bone, before)).collect());
+            }
+            for (bone, path) in bones.iter().zip(&mut self.bones[k]) {
                 path.push(bone.position.to_array(), bone.orientation.normalize().to_array());
                 path.scales.push([bone.scale, bone.scale, bone.stretch]);
             }
         }
-        for (pose, path) in moment.shapes.iter().zip(&mut paths) {
+        self.shapes.resize(moment.shapes.len(), Path::default());
+        for (pose, path) in moment.shapes.iter().zip(&mut self.shapes) {
             path.push(pose.position.as_vec3().to_array(), pose.orientation.as_quat().normalize().to_array());
         }
         Ok(())
     }
 
-    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, seen: &Seen<'_>, out: &mut Output) -> Result<(), ExportError> {
+        let Seen { header, looks } = seen;
         let mut doc = Document { root: Root::default(), bytes: Vec::new() };
         doc.root.asset = Asset { generator: Some(format!("Sutura {}", env!("CARGO_PKG_VERSION"))), ..Asset::default() };
         // Skinned meshes go by their joints alone and stand beside what is turned.
         let (mut scene_nodes, mut turned) = (Vec::new(), Vec::new());
         let mut moving: Vec<Index<Node>> = Vec::new();
-        let mut paths = self.paths.iter();
-        let texture = (!self.threads.is_empty()).then(|| doc.braid());
-        for (k, (skin, name)) in self.looks.skins.iter().zip(&self.threads).enumerate() {
+        let texture = (!looks.skins.is_empty()).then(|| doc.braid());
+        for (k, (skin, paths)) in looks.skins.iter().zip(&self.bones).enumerate() {
+            let name = &header.threads[k].name;
             let color = THREAD_COLORS[k % THREAD_COLORS.len()];
             let material = doc.material(name, color, 0.0, 0.55, texture, false);
-            let joints: Vec<Index<Node>> = (0..skin.n_bones())
-                .zip(&mut paths)
-                .map(|(e, path)| doc.node(&format!("{name}.{e}"), path, None))
-                .collect();
+            let joints: Vec<Index<Node>> =
+                paths.iter().enumerate().map(|(e, path)| doc.node(&format!("{name}.{e}"), path, None)).collect();
             moving.extend(&joints);
             let inverse: Vec<[f32; 16]> = skin
                 .bind()
@@ -190,10 +191,13 @@ impl Writer for Glb {
             turned.push(parent);
             scene_nodes.push(tube);
         }
-        for ((mesh, (name, open)), path) in self.looks.shapes.iter().zip(&self.shapes).zip(&mut paths) {
+        for ((mesh, shape), path) in looks.shapes.iter().zip(&header.shapes).zip(&self.shapes) {
+            let name = &shape.name;
+            // What has no inside is seen from both sides.
+            let open = matches!(shape.outline, ShapeOutline::Plane | ShapeOutline::Mesh { .. });
             let (color, metallic, roughness) =
-                if *open { ([22, 86, 78], 0.0, 0.92) } else { ([219, 222, 227], 1.0, 0.3) };
-            let material = doc.material(name, color, metallic, roughness, None, *open);
+                if open { ([22, 86, 78], 0.0, 0.92) } else { ([219, 222, 227], 1.0, 0.3) };
+            let material = doc.material(name, color, metallic, roughness, None, open);
             let mesh = doc.mesh(name, mesh, material, &[]);
             let node = doc.node(name, path, Some(mesh));
             moving.push(node);

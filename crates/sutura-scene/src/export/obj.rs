@@ -1,33 +1,29 @@
 //! Wavefront OBJ: an object a thread and shape, with texture coordinates and normals.
 
-use super::{ExportError, Looks, Moment, Output, Writer, fitted};
-use crate::trajectory::Header;
+use super::{ExportError, Moment, Output, Seen, Writer, fitted};
 use std::fmt::Write as _;
 use sutura::skin::{Bone, TriangleMesh};
 
-/// The looks, and the last text where there is to be one file.
+/// The number of files, and the last text where there is to be one.
+#[derive(Default)]
 pub struct Obj {
-    looks: Looks,
-    names: Vec<String>,
     last: Option<String>,
     number: usize,
 }
 
 impl Obj {
-    pub fn new(looks: Looks, header: &Header) -> Self {
-        let names = header.threads.iter().map(|t| &t.name).chain(header.shapes.iter().map(|s| &s.name));
-        // A name ends at a blank.
-        let names = names.map(|name| name.split_whitespace().collect::<Vec<_>>().join("_")).collect();
-        Obj { looks, names, last: None, number: 0 }
+    pub fn new() -> Self {
+        Obj::default()
     }
 
-    fn text(&self, moment: &Moment) -> String {
+    fn text(seen: &Seen<'_>, moment: &Moment) -> String {
+        let Seen { header, looks } = seen;
         let mut text = format!("# Sutura {}, meters, {} s\n", env!("CARGO_PKG_VERSION"), moment.time);
         let (mut vertices, mut textures) = (1, 1);
-        let mut names = self.names.iter();
-        let mut put = |mesh: &TriangleMesh, positions: &[[f32; 3]], normals: &[[f32; 3]]| {
+        let mut put = |name: &str, mesh: &TriangleMesh, positions: &[[f32; 3]], normals: &[[f32; 3]]| {
             // Writing to a string cannot fail.
-            let _ = writeln!(text, "o {}", names.next().map_or("thing", String::as_str));
+            // A name ends at a blank.
+            let _ = writeln!(text, "o {}", name.split_whitespace().collect::<Vec<_>>().join("_"));
             for [x, y, z] in positions {
                 let _ = writeln!(text, "v {x} {y} {z}");
             }
@@ -49,24 +45,24 @@ impl Obj {
             vertices += positions.len();
             textures += mesh.uvs.len();
         };
-        for (skin, strand) in self.looks.skins.iter().zip(&moment.threads) {
+        for ((skin, strand), thread) in looks.skins.iter().zip(&moment.threads).zip(&header.threads) {
             let mut bones = vec![Bone::default(); skin.n_bones()];
             skin.bones_at(&strand.positions, &strand.orientations, &mut bones);
             let (mut positions, mut normals) = (vec![[0.0; 3]; skin.n_vertices()], vec![[0.0; 3]; skin.n_vertices()]);
             skin.pose(&bones, &mut positions, &mut normals);
-            put(skin.mesh(), &positions, &normals);
+            put(&thread.name, skin.mesh(), &positions, &normals);
         }
-        for (mesh, pose) in self.looks.shapes.iter().zip(&moment.shapes) {
+        for ((mesh, pose), shape) in looks.shapes.iter().zip(&moment.shapes).zip(&header.shapes) {
             let placed = mesh.placed(pose);
-            put(&placed, &placed.positions, &placed.normals);
+            put(&shape.name, &placed, &placed.positions, &placed.normals);
         }
         text
     }
 }
 
 impl Writer for Obj {
-    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
-        let text = self.text(&fitted(header, moment));
+    fn add(&mut self, seen: &Seen<'_>, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
+        let text = Self::text(seen, &fitted(seen.header, moment));
         if out.is_one_file() {
             self.last = Some(text);
             return Ok(());
@@ -76,7 +72,7 @@ impl Writer for Obj {
         out.write(Some(&name), text.as_bytes())
     }
 
-    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, _: &Seen<'_>, out: &mut Output) -> Result<(), ExportError> {
         self.last.map_or(Ok(()), |text| out.write(None, text.as_bytes()))
     }
 }

@@ -4,16 +4,16 @@
 //! Names and fields are constants, so that nothing needs escaping, and the format is a dozen tags: the crates for VTK
 //! bring a parser of the old format and three compressors.
 
-use super::{ExportError, Looks, Moment, Output, Strand, Writer};
+use super::{ExportError, Looks, Moment, Output, Seen, Strand, Writer};
 use crate::trajectory::{Header, Thread, ThreadLook};
 use base64::Engine as _;
 use std::fmt::Write as _;
 use sutura::glam::{DQuat, DVec3};
 use sutura::{Pose, Profile, Section};
 
-/// Looks, and which file holds which time.
+/// Which file holds which time.
+#[derive(Default)]
 pub struct Vtk {
-    looks: Looks,
     threads: Vec<(f64, String)>,
     shapes: Vec<(f64, String)>,
     /// Where the shapes were when they were written last.
@@ -38,11 +38,11 @@ struct Field {
 }
 
 impl Vtk {
-    pub fn new(looks: Looks) -> Self {
-        Vtk { looks, threads: Vec::new(), shapes: Vec::new(), placed: None }
+    pub fn new() -> Self {
+        Vtk::default()
     }
 
-    fn surfaces(&self, moment: &Moment) -> PolyData {
+    fn surfaces(looks: &Looks, moment: &Moment) -> PolyData {
         let mut data = PolyData {
             points: Vec::new(),
             cells: Vec::new(),
@@ -51,7 +51,7 @@ impl Vtk {
             cell_fields: Vec::new(),
         };
         let (mut normals, mut which) = (Vec::new(), Vec::new());
-        for (k, (mesh, pose)) in self.looks.shapes.iter().zip(&moment.shapes).enumerate() {
+        for (k, (mesh, pose)) in looks.shapes.iter().zip(&moment.shapes).enumerate() {
             let first = (data.points.len() / 3) as i32;
             let mesh = mesh.placed(pose);
             data.points.extend(mesh.positions.iter().flatten());
@@ -66,10 +66,10 @@ impl Vtk {
 }
 
 impl Writer for Vtk {
-    fn add(&mut self, header: &Header, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
+    fn add(&mut self, seen: &Seen<'_>, moment: &Moment, out: &mut Output) -> Result<(), ExportError> {
         let number = self.threads.len();
         let name = format!("threads_{number:05}.vtp");
-        out.write(Some(&name), threads(header, moment).text().as_bytes())?;
+        out.write(Some(&name), threads(seen.header, moment).text().as_bytes())?;
         self.threads.push((moment.time, name));
         if moment.shapes.is_empty() {
             return Ok(());
@@ -77,7 +77,7 @@ impl Writer for Vtk {
         // Shapes that stay where they are stand in one file.
         if self.placed.as_ref() != Some(&moment.shapes) {
             let name = format!("shapes_{number:05}.vtp");
-            out.write(Some(&name), self.surfaces(moment).text().as_bytes())?;
+            out.write(Some(&name), Self::surfaces(seen.looks, moment).text().as_bytes())?;
             self.shapes.push((moment.time, name));
             self.placed = Some(moment.shapes.clone());
         } else if let Some((_, name)) = self.shapes.last().cloned() {
@@ -86,7 +86,7 @@ impl Writer for Vtk {
         Ok(())
     }
 
-    fn finish(self: Box<Self>, out: &mut Output) -> Result<(), ExportError> {
+    fn finish(self: Box<Self>, _: &Seen<'_>, out: &mut Output) -> Result<(), ExportError> {
         for (name, files) in [("threads.pvd", &self.threads), ("shapes.pvd", &self.shapes)] {
             if files.is_empty() {
                 continue;

@@ -352,9 +352,18 @@ impl Parser<'_> {
     /// An argument that names a thread, grip, shape, body, or a place on a thread: `silk.end`, `silk.particle[3]`,
     /// `silk[35 mm]`.
     fn reference(&mut self, function: &str, wants: Wants) -> Result<Ref, Message> {
-        let Some(Token::Word(word)) = self.next() else {
+        let Some(Token::Word(mut word)) = self.next() else {
             return Err((format!("`{function}` needs the name of a thing"), None));
         };
+        // A part of a thread may be named after it: `silk.cut`.
+        while let (Some(Token::Mark(".")), Some(Token::Word(part))) = (self.peek(), self.tokens.get(self.at + 1)) {
+            let name = format!("{word}.{part}");
+            if self.names.get(&name).is_none() {
+                break;
+            }
+            word = name;
+            self.at += 2;
+        }
         let reference = match self.names.get(&word) {
             Some(Named::Thread(t)) => self.place_on(t, &word)?,
             Some(Named::Grip(g)) => Ref::Grip(g),

@@ -1,6 +1,6 @@
 //! What happens: phases, actions, motions, loads.
 
-use super::things::{n_elements, reel_law, remake};
+use super::things::{reel_law, remake};
 use super::*;
 
 /// Longest time of a phase that ends by a condition, unless it says otherwise \[s\].
@@ -79,9 +79,9 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
-        const VERBS: [&str; 15] = [
-            "take", "let_go", "move", "rest", "push", "hold", "release", "load", "unload", "mark", "gravity", "solver",
-            "friction", "material", "reel",
+        const VERBS: [&str; 16] = [
+            "take", "let_go", "move", "rest", "push", "hold", "release", "load", "unload", "cut", "mark", "gravity",
+            "solver", "friction", "material", "reel",
         ];
         let found: Vec<(&str, Value<'d>)> =
             VERBS.iter().filter_map(|v| table.get(v).map(|value| (*v, value))).collect();
@@ -110,6 +110,7 @@ impl<'d> Loader<'d> {
             "release" => self.find_body(value).map(|body| Action::Release { body }),
             "load" => self.find_load(value).and_then(|load| self.load(table, load)),
             "unload" => self.find_load(value).map(|load| Action::Unload { load }),
+            "cut" => self.find_thread(value).and_then(|thread| self.cut(table, thread)),
             "mark" => self.find_thread(value).map(|thread| Action::Mark { thread }),
             "gravity" => value.vector(Dim::ACCELERATION).map(|v| Action::Gravity { value: v, ramp: ramp(table, 0.0) }),
             "reel" => self.find_reel(value).zip(reel_law(table)).map(|(reel, law)| Action::Reel { reel, law }),
@@ -180,8 +181,8 @@ impl<'d> Loader<'d> {
     }
 
     pub(super) fn place(&self, value: &Value<'d>, thread: usize) -> Option<Place> {
-        let n = n_elements(&self.threads.get(thread)?.spec);
-        let length: f64 = self.rest_length(thread);
+        let lengths = &self.extents.get(thread)?.0;
+        let (n, length): (usize, f64) = (lengths.len(), lengths.iter().sum());
         let at = if value.is_text() {
             let text = value.text()?;
             match text.as_ref() {
@@ -222,18 +223,6 @@ impl<'d> Loader<'d> {
         }
         Some(engine_place(at, length))
     }
-    pub(super) fn rest_length(&self, thread: usize) -> f64 {
-        let spec = &self.threads[thread].spec;
-        match &spec.rest {
-            RestShape::Given { lengths: Some(l), .. } => l.iter().sum(),
-            _ => {
-                let points = &spec.centerline;
-                let closing = spec.closure.map_or(0.0, |_| points[0].distance(points[points.len() - 1]));
-                points.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>() + closing
-            }
-        }
-    }
-
     pub(super) fn push(&self, table: &Table<'d>, what: Mover) -> Option<Action> {
         let direction = table.need("direction", "a direction").and_then(|v| v.direction());
         let force = table.need("force", "a force").and_then(|v| in_range_value(&v, Dim::FORCE, 0.0, 1e9));

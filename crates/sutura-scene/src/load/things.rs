@@ -629,6 +629,18 @@ fn names_of_materials() -> String {
 
 /// Frames along points, the first director nearest to `hint`, turned evenly by `twist` over the length.
 /// Elements of a thread.
+/// Rest lengths of the elements of a thread \[m\].
+pub(super) fn rest_lengths(spec: &RodSpec) -> Vec<f64> {
+    match &spec.rest {
+        RestShape::Given { lengths: Some(lengths), .. } => lengths.clone(),
+        _ => {
+            let points = &spec.centerline;
+            let closing = spec.closure.map(|_| points[0].distance(points[points.len() - 1]));
+            points.windows(2).map(|p| p[0].distance(p[1])).chain(closing).collect()
+        }
+    }
+}
+
 pub(super) fn n_elements(spec: &RodSpec) -> usize {
     spec.centerline.len() - usize::from(spec.closure.is_none())
 }

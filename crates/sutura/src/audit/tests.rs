@@ -23,6 +23,7 @@ impl Scene {
     fn show(&self, audit: &mut Audit, time: f64) {
         let rods = self.rods.iter().map(|(slot, radius, x, rest)| RodSlice {
             slot: *slot,
+            turned: 0,
             radius: *radius,
             positions: x,
             rest_lengths: rest,

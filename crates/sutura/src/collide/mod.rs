@@ -7,6 +7,7 @@ mod tree;
 use crate::lanes::{Vec2, pairs};
 use crate::model::body::BodyModel;
 use crate::model::collider::{Collider, Distance};
+use crate::model::cut::{End, Faces};
 use crate::model::shape::ShapeMotion;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
@@ -113,7 +114,8 @@ fn turning_at_end(model: &Model, x: &[DVec3], total: &mut [[f64; 2]]) {
 }
 
 /// Whether two elements, `a < b`, are so near along one thread that their overlap is bending, not contact: less than
-/// half a turn of the thread's own radius. Likewise by way of a weld.
+/// half a turn of the thread's own radius. Likewise by way of a weld, and where a cut parted them: its faces are flat,
+/// and the round ends that contact gives a thread lie in each other there.
 #[inline]
 fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> bool {
     arc[b] - arc[a + 1] < core::f64::consts::PI * radius[a] && model.rod_of[a] == model.rod_of[b]
@@ -121,6 +123,19 @@ fn neighbors(model: &Model, arc: &[f64], radius: &[f64], a: usize, b: usize) -> 
             .welds
             .iter()
             .any(|(_, weld)| way_to_weld(model, arc, weld, a) + way_to_weld(model, arc, weld, b) < weld.filter_distance)
+        || model.faces.iter().any(|faces| way_past_cut(model, arc, faces, a, b) < faces.filter_distance)
+}
+
+/// Rest arc between two elements by way of a cut, as if there were none; infinite where they are not on either side.
+fn way_past_cut(model: &Model, arc: &[f64], faces: &Faces, a: usize, b: usize) -> f64 {
+    let [first, second] = faces.ends;
+    let way = |end: End, e: usize| {
+        if end.rod != model.rod_of[e] {
+            return f64::INFINITY;
+        }
+        if end.at_end { arc[end.index(model)] - arc[e + 1] } else { arc[e] }
+    };
+    (way(first, a) + way(second, b)).min(way(second, a) + way(first, b))
 }
 
 /// Rest arc between an element and a weld along its own thread; infinite where that is not joined there.

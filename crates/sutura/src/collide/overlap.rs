@@ -4,7 +4,7 @@
 //! Contact parts what is pressed into each other as long as the centerlines say where to. Where a centerline runs
 //! within another thread, in a solid or across a mesh, what comes of it is a knot that nobody tied, or none.
 //!
-//! Left out is what contact leaves out (neighbors along a thread and through a weld), and what is pressed in by less
+//! Left out is what contact leaves out (neighbors along a thread, through a weld and at a cut), and what is pressed in by less
 //! than `PRESSED`.
 
 use super::tree::{Bounds, Tree};
@@ -12,6 +12,7 @@ use super::{arcs, attached, neighbors, turning};
 use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::collider::Collider;
+use crate::model::cut::Faces;
 use crate::model::mesh::solid_angle;
 use crate::model::rod::Rod;
 use crate::model::shape::{Geometry, Shape};
@@ -147,7 +148,8 @@ impl Seen<'_> {
                     super::way_to_weld(model, arc, w, a) + super::way_to_weld(model, arc, w, b)
                         < w.filter_distance + room
                 };
-                let fold = along || model.welds.iter().any(|(_, w)| fork(w));
+                let faces = |f: &Faces| super::way_past_cut(model, arc, f, a, b) < f.filter_distance + room;
+                let fold = along || model.welds.iter().any(|(_, w)| fork(w)) || model.faces.iter().any(faces);
                 pairs.insert((a, b), Pair { a, b, s: c.s, t: c.t, apart, fold });
             }
         });

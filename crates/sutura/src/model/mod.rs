@@ -2,6 +2,7 @@
 
 pub mod body;
 pub(crate) mod collider;
+pub mod cut;
 pub mod grip;
 pub mod material;
 pub mod mesh;
@@ -16,6 +17,7 @@ use crate::arrays::element_arrays;
 use crate::handle::Slots;
 use crate::params::{Friction, Settings};
 use body::BodyModel;
+use cut::Faces;
 use glam::{DQuat, DVec3};
 use grip::{LoadKind, LoadState};
 use material::{Material, SectionStiffness};
@@ -39,6 +41,8 @@ pub struct Model {
     pub(crate) shapes: Slots<ShapeModel>,
     pub(crate) bodies: Slots<BodyModel>,
     pub(crate) welds: Slots<WeldModel>,
+    /// Of each cut the two ends that it made, while both threads are there.
+    pub(crate) faces: Vec<Faces>,
     /// What was put into the world since the last step, which the next one looks at.
     pub(crate) placed: Placed,
     /// Friction of pairs of surfaces, smaller index first, sorted.
@@ -151,7 +155,7 @@ impl Model {
         self.inextensible[particles.clone()].fill(stretch == Stretch::Inextensible);
         self.refresh_rod(particles);
     }
-    fn refresh_rod(&mut self, particles: core::ops::Range<usize>) {
+    pub(crate) fn refresh_rod(&mut self, particles: core::ops::Range<usize>) {
         for e in particles {
             self.refresh_element(e);
             self.refresh_joint(e);

@@ -179,6 +179,8 @@ pub(crate) struct RodModel {
     /// Whether it bends more easily one way than the other.
     pub flat: bool,
     pub surface: u32,
+    /// How often its particles were numbered from another one on.
+    pub turned: u32,
 }
 
 impl RodModel {

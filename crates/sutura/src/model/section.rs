@@ -130,6 +130,25 @@ impl Profile {
         }
     }
 
+    /// The same, seen from a place on it on.
+    pub(crate) fn beyond(&self, from: f64) -> Self {
+        let start = (!self.0.is_empty()).then(|| (0.0, self.at(from)));
+        let after = self.0.iter().filter(|(s, _)| *s > from).map(|(s, v)| (s - from, *v));
+        Profile(start.into_iter().chain(after).collect())
+    }
+
+    /// That of a ring of this length which begins at another place.
+    pub(crate) fn turned(&self, from: f64, length: f64) -> Self {
+        let (mut turned, seam) = (self.beyond(from), length - from);
+        turned.0.retain(|(s, _)| *s < seam);
+        if !self.0.is_empty() {
+            let before = self.beyond(0.0).0.into_iter().filter(|(s, _)| *s < from).map(|(s, v)| (s + seam, v));
+            let ends = [(seam, self.at(length)), (length, self.at(from))];
+            turned.0.extend([ends[0]].into_iter().chain(before).chain([ends[1]]));
+        }
+        turned
+    }
+
     /// The largest factor.
     pub fn largest(&self) -> f64 {
         self.0.iter().map(|(_, v)| *v).reduce(f64::max).unwrap_or(1.0)

@@ -138,6 +138,15 @@ impl Side {
     }
 }
 
+/// Rest rotation from the frame that ends at one place of a weld to the frame that begins at another; places are slots
+/// of threads and particles.
+pub(crate) fn rest_across(members: &[Member], before: (u32, u32), after: (u32, u32)) -> Option<DQuat> {
+    let of = |place: (u32, u32)| members.iter().find(|m| (m.rod, m.particle) == place);
+    let (before, after) = (of(before)?.before?, of(after)?.after?);
+    let half = before.rest_half * before.rest_half * before.section.conjugate();
+    Some(half * after.section * after.rest_half * after.rest_half)
+}
+
 impl WeldSpec {
     /// Joins ends or inner particles as they lie.
     pub fn new(places: Vec<(Handle<Rod>, Place)>) -> Self {

@@ -86,6 +86,13 @@ impl Contact {
     pub fn sites_mut(&mut self) -> [&mut Site; 2] {
         [&mut self.a, &mut self.b]
     }
+    /// The same, seen from the other side.
+    fn swap(&mut self) {
+        core::mem::swap(&mut self.a, &mut self.b);
+        self.normal = -self.normal;
+        self.friction = -self.friction;
+        self.residual_slip = -self.residual_slip;
+    }
     /// In which they are kept.
     pub fn order(&self, other: &Self) -> core::cmp::Ordering {
         let key = |c: &Self| {
@@ -131,6 +138,9 @@ impl Contacts {
         for c in &mut self.0 {
             for site in c.sites_mut() {
                 *site = name(*site);
+            }
+            if c.elements().is_some_and(|(a, b)| a > b) {
+                c.swap();
             }
         }
         self.0.retain(|c| c.elements().is_none_or(|(a, b)| a < b));

@@ -1,6 +1,7 @@
 //! The world: what a user builds, steps and reads. Handles become indices here and nowhere else.
 
 mod bodies;
+mod cuts;
 mod holds;
 mod rods;
 mod saved;

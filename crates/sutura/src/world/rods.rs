@@ -32,6 +32,7 @@ impl World {
             stretch: spec.stretch,
             flat: crate::model::rod::is_flat(&low.sections),
             surface: spec.surface,
+            turned: 0,
         };
         let handle: Handle<Rod> = model.rods.insert(rod);
         model.placed.rods.push(handle.index);
@@ -180,6 +181,7 @@ impl World {
         let apart: Vec<WeldModel> = model.welds.iter().map(|(_, w)| w).filter(|w| !w.joins()).cloned().collect();
         model.welds.retain(WeldModel::joins);
         model.refresh_welds();
+        model.faces.retain(|f| f.ends.iter().all(|end| end.rod != rod.index));
         state.reels.retain(|r| r.rod != rod.index);
         apart.iter().for_each(|weld| self.hold_alone(weld));
         Ok(())

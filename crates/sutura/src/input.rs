@@ -11,6 +11,7 @@ use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::body::{Body, BodySpec, ColliderSpec};
 use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec};
+use crate::model::joint::{Joint, JointKind, JointModel, JointSpec, Motor};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Closure, RestShape, Rod, RodSpec, Stretch};
@@ -78,6 +79,10 @@ pub enum Input {
     InsertBody(BodySpec),
     /// [`World::remove_body`].
     RemoveBody(Handle<Body>),
+    /// [`World::insert_joint`].
+    InsertJoint(JointSpec),
+    /// [`World::remove_joint`].
+    RemoveJoint(Handle<Joint>),
     /// [`World::step`] by a time \[s\], and the state hash that it left.
     Step(f64, u64),
 }
@@ -110,6 +115,8 @@ impl Input {
             Input::Restore(bytes) => world.restore(bytes)?,
             Input::InsertBody(spec) => drop(world.insert_body(spec)?),
             Input::RemoveBody(body) => world.remove_body(*body)?,
+            Input::InsertJoint(spec) => drop(world.insert_joint(spec)?),
+            Input::RemoveJoint(joint) => world.remove_joint(*joint)?,
             Input::StepWork(most) => world.set_step_work(*most)?,
             Input::Step(dt, _) => return Ok(Some(world.step(*dt))),
         }
@@ -198,6 +205,10 @@ impl Recorder {
         insert_body(spec: &BodySpec) -> Handle<Body>, Input::InsertBody(spec.clone());
         /// [`World::remove_body`].
         remove_body(body: Handle<Body>) -> (), Input::RemoveBody(body);
+        /// [`World::insert_joint`].
+        insert_joint(spec: &JointSpec) -> Handle<Joint>, Input::InsertJoint(spec.clone());
+        /// [`World::remove_joint`].
+        remove_joint(joint: Handle<Joint>) -> (), Input::RemoveJoint(joint);
         /// [`World::set_step_work`].
         set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
@@ -265,7 +276,7 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24 and 25, version 4 also
+/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24, 25, 30 and 31, version 4 also
 /// without the input 23, version 3 also without drag and without [`ShapeSpec::open`], version 2 also without the inputs
 /// 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
@@ -351,16 +362,13 @@ impl<T> Bytes for Handle<T> {
     }
 }
 
-impl<T: Bytes + Copy + Default, const N: usize> Bytes for [T; N] {
+impl<T: Bytes, const N: usize> Bytes for [T; N] {
     fn put(&self, out: &mut Vec<u8>) {
         self.iter().for_each(|v| v.put(out));
     }
     fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
-        let mut out = [T::default(); N];
-        for v in &mut out {
-            *v = T::take(input)?;
-        }
-        Ok(out)
+        let items = (0..N).map(|_| T::take(input)).collect::<Result<Vec<T>, Error>>()?;
+        Ok(items.try_into().unwrap_or_else(|_| unreachable!("as many as there are")))
     }
 }
 
@@ -460,11 +468,15 @@ structure!(RodSpec {
 });
 structure!(Closure { twist });
 structure!(ColliderSpec { geometry, pose, density, surface });
+structure!(Motor { speed, most });
+structure!(JointSpec { bodies, frames, kind, compliance, angular_compliance, limits, motor, friction, touch });
+structure!(JointModel { bodies, frames, kind, compliance, limits, drives, touch });
 structure!(BodySpec { pose, colliders, velocity, angular_velocity });
 structure!(WeldSpec { places, rest });
 structure!(ReelSpec { rod, at_end, law, supply });
 structure!(GripSpec { rod, place, hold, drive, ramp });
 structure!(LoadSpec { rod, kind });
+variants!(JointKind { 0 => Fixed, 1 => Ball, 2 => Hinge, 3 => Slider });
 variants!(Shear { 0 => Poisson(nu), 1 => Modulus(g) });
 variants!(Section { 0 => Round, 1 => Ellipse(axes), 2 => Rectangle(sides) });
 variants!(Solver { 0 => Direct, 1 => Paper(numbers) });
@@ -509,4 +521,6 @@ variants!(Input {
     23 => StepWork(most),
     24 => InsertBody(spec),
     25 => RemoveBody(body),
+    30 => InsertJoint(spec),
+    31 => RemoveJoint(joint),
 });

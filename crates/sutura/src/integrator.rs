@@ -195,6 +195,7 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                 BodyStart {
                     target: now.position + now.velocity * (h * keep),
                     carried: now.velocity,
+                    kept: now.velocity * keep,
                     base: now.orientation,
                     momentum: now.angular_momentum * keep_spin,
                 }
@@ -208,6 +209,7 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                 BodyStart {
                     target: base + carried * stage.span,
                     carried,
+                    kept: carried,
                     base: (second * (first * was.orientation)).normalize(),
                     momentum: was.angular_momentum * keep_spin + times(was.torque, w0) + times(now.torque, w1),
                 }
@@ -358,10 +360,12 @@ pub(crate) fn spins(model: &Model, origin: &State, state: &State, h: f64, e: usi
     [origin.angular_velocity[e] * half_damping(model, h).1, state.angular_velocity[e]]
 }
 
-/// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round.
+/// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round; and
+/// whether a joint has come to a limit, or its motor to its bound.
 pub(crate) fn touches_anew(before: &State, now: &State) -> bool {
     let pieces = |c: &Contact| (c.a.piece(), c.b.piece(), c.sliding);
     !before.contacts.iter().map(pieces).eq(now.contacts.iter().map(pieces))
+        || !before.joints.iter().map(|(_, j)| j.phase()).eq(now.joints.iter().map(|(_, j)| j.phase()))
 }
 
 #[cfg(test)]

@@ -48,6 +48,7 @@ pub use handle::Handle;
 pub use math::Pose;
 pub use model::body::{Body, BodySpec, ColliderSpec, MassProperties};
 pub use model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
+pub use model::joint::{Joint, JointKind, JointSpec, Motor};
 pub use model::material::{Material, Plasticity, Shear};
 pub use model::reel::{Reel, ReelLaw, ReelSpec};
 pub use model::rod::{Closure, RestShape, Rod, RodSpec, Stretch, transported_frames};
@@ -58,5 +59,5 @@ pub use params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrd
 pub use rejection::Rejection;
 pub use report::{Incident, IncidentKind, StepReport};
 pub use rod::energy::Energy;
-pub use view::{BodyView, ContactSide, ContactView, RodView, ShapeView, View, WeldView};
+pub use view::{BodyView, ContactSide, ContactView, JointView, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

@@ -39,6 +39,8 @@ pub(crate) struct BodyStart {
     /// Where velocity alone would carry its center of mass, and the velocity there.
     pub target: DVec3,
     pub carried: DVec3,
+    /// The velocity that it ends with where nothing acts on it.
+    pub kept: DVec3,
     /// Orientation and angular momentum that the solve sets out with.
     pub base: DQuat,
     pub momentum: DVec3,

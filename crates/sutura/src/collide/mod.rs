@@ -231,7 +231,7 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
                 [a, b].iter().filter_map(|s| model.body_of(*s)).map(BodyModel::size).fold(f64::INFINITY, f64::min);
             let room = DVec3::splat(params::MARGIN * size);
             let near = size.is_finite() && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
-            if near && first.body != second.body {
+            if near && first.body != second.body && !model.apart(first.body, second.body) {
                 solids.push((a, b));
             }
         }

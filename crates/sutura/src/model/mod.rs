@@ -3,6 +3,7 @@
 pub mod body;
 pub(crate) mod collider;
 pub mod grip;
+pub mod joint;
 pub mod material;
 pub mod mesh;
 pub mod reel;
@@ -17,6 +18,7 @@ use crate::params::{Friction, Settings};
 use body::BodyModel;
 use glam::{DQuat, DVec3};
 use grip::{LoadKind, LoadState};
+use joint::JointModel;
 use material::{Material, SectionStiffness};
 use rod::{RodModel, Stretch};
 use section::Factors;
@@ -37,6 +39,7 @@ pub struct Model {
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
     pub(crate) bodies: Slots<BodyModel>,
+    pub(crate) joints: Slots<JointModel>,
     pub(crate) welds: Slots<WeldModel>,
     /// What was put into the world since the last step, which the next one looks at.
     pub(crate) placed: Placed,
@@ -118,6 +121,11 @@ impl Model {
     /// The body that a shape is part of.
     pub(crate) fn body_of(&self, shape: u32) -> Option<&BodyModel> {
         self.bodies.at(self.shapes.at(shape)?.body?)
+    }
+    /// Whether two bodies are joined so that they do not touch each other.
+    pub(crate) fn apart(&self, a: Option<u32>, b: Option<u32>) -> bool {
+        let joins = |j: &JointModel| !j.touch && (j.bodies == [a, b] || j.bodies == [b, a]);
+        a.is_some() && b.is_some() && self.joints.iter().any(|(_, j)| joins(j))
     }
     /// Where a shape is in its body.
     pub(crate) fn local_of(&self, shape: u32) -> Option<&crate::math::Pose> {

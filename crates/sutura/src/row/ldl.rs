@@ -24,6 +24,11 @@ impl Ldl {
     /// Adds the last row of the grown matrix, diagonal included. False, and nothing added, when it is not positive
     /// definite.
     pub fn push(&mut self, entries: impl Iterator<Item = f64>) -> bool {
+        self.push_signed(entries, 1.0)
+    }
+
+    /// The same of a matrix that is quasi-definite: the new pivot is to have this sign.
+    pub fn push_signed(&mut self, entries: impl Iterator<Item = f64>, sign: f64) -> bool {
         let n = self.size;
         let from = self.packed.len();
         self.packed.extend(entries);
@@ -39,7 +44,7 @@ impl Ldl {
             pivot -= y * last[k];
         }
         last[n] = pivot;
-        if !(pivot > 0.0 && pivot.is_finite()) {
+        if !(sign * pivot > 0.0 && pivot.is_finite()) {
             self.packed.truncate(from);
             return false;
         }

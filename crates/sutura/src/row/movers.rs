@@ -112,6 +112,12 @@ impl Movers {
         self.sliders.len() + SIX * self.bodies.len()
     }
 
+    /// First unknown of a body, by its slot.
+    pub fn first_of(&self, slot: u32) -> Option<usize> {
+        let number = self.bodies.binary_search_by_key(&slot, |(s, _)| *s).ok()?;
+        Some(self.sliders.len() + SIX * number)
+    }
+
     pub fn has_bodies(&self) -> bool {
         !self.bodies.is_empty()
     }

@@ -59,6 +59,7 @@ pub struct State {
     pub(crate) shape_target: Vec<Pose>,
 
     pub(crate) bodies: Slots<BodyState>,
+    pub(crate) joints: Slots<JointState>,
     pub(crate) grips: Slots<GripState>,
     pub(crate) loads: Slots<LoadState>,
     pub(crate) reels: Slots<ReelState>,
@@ -102,6 +103,29 @@ pub(crate) struct BodyState {
     /// Rates of the two, where the integrator needs them and `history` says that they are known; else zero.
     pub acceleration: DVec3,
     pub torque: DVec3,
+}
+
+/// A joint. Forces are those of the last solve on its second side, along the axes of its first frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct JointState {
+    /// Angle \[rad\] or way \[m\] along its axis.
+    pub coordinate: f64,
+    /// What holds it \[N\], \[N m\], about the origin of its second frame.
+    pub force: DVec3,
+    pub torque: DVec3,
+    /// Along its axis: of the motor, of friction, and of a limit.
+    pub drive: [f64; 2],
+    pub stop: f64,
+    /// Whether motor and friction are at their bounds.
+    pub yields: [bool; 2],
+}
+
+impl JointState {
+    /// What goes on as it is while this is the same: at which limit it is, which drives are at which bound.
+    pub fn phase(&self) -> (f64, [f64; 2]) {
+        let sign = |v: f64| if v == 0.0 { 0.0 } else { v.signum() };
+        (sign(self.stop), [0, 1].map(|k| if self.yields[k] { sign(self.drive[k]) } else { 0.0 }))
+    }
 }
 
 /// A grip in action.
@@ -177,6 +201,7 @@ impl State {
             shape_pose,
             shape_target,
             bodies,
+            joints,
             grips,
             loads,
             reels,
@@ -200,6 +225,7 @@ impl State {
         self.shape_pose.clone_from(shape_pose);
         self.shape_target.clone_from(shape_target);
         self.bodies.copy_from(bodies);
+        self.joints.copy_from(joints);
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
         self.reels.copy_from(reels);

@@ -57,10 +57,11 @@ impl World {
         Ok(handle)
     }
 
-    /// Removes a body and its shapes.
+    /// Removes a body, its shapes and its joints.
     pub fn remove_body(&mut self, body: Handle<Body>) -> Result<(), Error> {
         let gone = self.model.bodies.remove(body).ok_or(BODY)?;
         self.state.bodies.remove(body);
+        self.drop_joints_of(body.index);
         for (shape, _) in gone.shapes {
             self.model.shapes.empty(shape);
             let touches = |site: crate::state::Site| site.any_shape() == Some(shape);

@@ -197,6 +197,7 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                     carried: now.velocity,
                     kept: now.velocity * keep,
                     base: now.orientation,
+                    part: 0.5,
                     momentum: now.angular_momentum * keep_spin,
                 }
             }
@@ -211,12 +212,13 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                     carried,
                     kept: carried,
                     base: (second * (first * was.orientation)).normalize(),
+                    part: 1.0,
                     momentum: was.angular_momentum * keep_spin + times(was.torque, w0) + times(now.torque, w1),
                 }
             }
         };
         let fall = model.settings.gravity * (stage.span * stage.span);
-        let orientation = turned_freely(moments, start.base, start.momentum, stage.span);
+        let orientation = turned_freely(moments, &start, stage.span);
         let now = state.bodies.at_mut(slot).expect("living");
         (now.position, now.orientation) = (start.target + fall, orientation);
         place_shapes(model, state, slot);
@@ -232,7 +234,7 @@ fn leave_rates_of_bodies(model: &Model, state: &mut State, motion: &Motion, stag
         let (Some(body), Some(now), Some(start)) = (model.bodies.at(slot), state.bodies.at_mut(slot), start) else {
             continue;
         };
-        let reached = momentum(body.mass.moments, start.base, now, stage.span);
+        let reached = momentum(body.mass.moments, start, now, stage.span);
         let acceleration = (now.position - start.target) * (over * motion.heavier[0]);
         if model.settings.integrator == Integrator::TrBdf2 {
             now.acceleration = acceleration;

@@ -9,7 +9,7 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{BodyState, Contact, Contacts, GripState, JointState, History, LoadState, ReelState, Site, State};
+use crate::state::{BodyState, Contact, Contacts, GripState, History, JointState, LoadState, ReelState, Site, State};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.

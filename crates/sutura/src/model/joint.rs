@@ -147,11 +147,8 @@ impl JointSpec {
             check(what, field, v, v >= 0.0, "a finite number >= 0")?;
         }
         check(what, "friction", self.friction, self.friction >= 0.0, "a finite number >= 0")?;
-        let asked = [
-            ("limits", self.limits.is_some()),
-            ("motor", self.motor.is_some()),
-            ("friction", self.friction > 0.0),
-        ];
+        let asked =
+            [("limits", self.limits.is_some()), ("motor", self.motor.is_some()), ("friction", self.friction > 0.0)];
         if self.kind.axis().is_none()
             && let Some((field, _)) = asked.iter().find(|(_, asked)| *asked)
         {
@@ -261,9 +258,7 @@ impl Meeting {
             JointKind::Ball => {
                 Pose { orientation: first.orientation.conjugate() * second.orientation, ..Pose::IDENTITY }
             }
-            JointKind::Hinge => {
-                Pose { orientation: crate::math::exp(DVec3::Z * self.twist()), ..Pose::IDENTITY }
-            }
+            JointKind::Hinge => Pose { orientation: crate::math::exp(DVec3::Z * self.twist()), ..Pose::IDENTITY },
             JointKind::Slider => Pose::at(DVec3::Z * self.off(kind, Along::Way(2))),
         }
     }

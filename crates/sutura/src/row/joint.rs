@@ -357,12 +357,12 @@ fn residual(model: &Model, state: &State, motion: &Motion, joint: &JointModel, m
 /// Velocity of the center and angular velocity of a body that the iterate would leave.
 fn rates(model: &Model, bodies: &Slots<BodyState>, motion: &Motion, slot: u32) -> [DVec3; 2] {
     let (Some(body), Some(now), Some(start)) =
-        (model.bodies.at(slot), bodies.at(slot), motion.bodies.get(slot as usize).copied().flatten())
+        (model.bodies.at(slot), bodies.at(slot), motion.bodies.get(slot as usize).and_then(Option::as_ref))
     else {
         return [DVec3::ZERO; 2];
     };
     let q = now.orientation;
-    let momentum = momentum(body.mass.moments, start.base, now, motion.span);
+    let momentum = momentum(body.mass.moments, start, now, motion.span);
     let velocity = start.kept + (now.position - start.target) / motion.span;
     [velocity, q * ((q.conjugate() * momentum) / body.mass.moments)]
 }
@@ -380,6 +380,5 @@ fn turning_stiffness(force: DVec3, arm: DVec3) -> DMat3 {
     let Some(bisector) = (f + r).try_normalize() else { return DMat3::ZERO };
     let within = 0.5 * size * (1.0 + cos);
     let across = f.cross(r).try_normalize().unwrap_or(DVec3::ZERO);
-    (DMat3::IDENTITY - outer(bisector, bisector)) * within
-        + outer(across, across) * ((size * cos).max(0.0) - within)
+    (DMat3::IDENTITY - outer(bisector, bisector)) * within + outer(across, across) * ((size * cos).max(0.0) - within)
 }

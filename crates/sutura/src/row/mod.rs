@@ -42,10 +42,7 @@ pub(crate) struct Rows {
 
 impl Rows {
     pub fn is_empty(&self) -> bool {
-        self.shapes.is_empty()
-            && self.threads.is_empty()
-            && self.bodies.rows.is_empty()
-            && self.joints.stops.is_empty()
+        self.shapes.is_empty() && self.threads.is_empty() && self.bodies.rows.is_empty() && self.joints.stops.is_empty()
     }
 
     /// Whether the small problem was solved well enough for the step to count.

@@ -559,7 +559,12 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
         for (z, r) in right.iter_mut().zip(more.iter()) {
             *z += *r;
         }
-        hand_over(entries, force, (&mut rows.threads, &mut rows.shapes), (&mut rows.bodies.rows, &mut rows.joints.stops));
+        hand_over(
+            entries,
+            force,
+            (&mut rows.threads, &mut rows.shapes),
+            (&mut rows.bodies.rows, &mut rows.joints.stops),
+        );
     }
     rows.border.add_steps(steps);
     for (z, r) in step.iter_mut().zip(right.iter()) {

@@ -41,7 +41,7 @@ const EXACT: f64 = 1e-9;
 const ROUNDING: f64 = 1e-14;
 
 /// Turn of a joined body that the next iteration may be expected to make \[rad\], and its move over its size.
-const STILL: f64 = 1e-6;
+const STILL: f64 = 1e-8;
 
 /// Compliance of a limit over that of the bodies in a substep.
 const GIVE: f64 = 1e-6;

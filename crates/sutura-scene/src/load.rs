@@ -2,6 +2,7 @@
 
 mod bodies;
 mod happening;
+mod joints;
 mod things;
 mod watching;
 
@@ -131,6 +132,7 @@ impl<'d> Loader<'d> {
         self.collect_names(root, start.as_ref());
         let frictions = self.friction(root);
         let welds = read_all(root, "weld", |t| self.weld(t));
+        let joints = read_all(root, "joint", |t| self.joint(t));
         self.reels = read_all(root, "reel", |t| self.reel(t));
 
         let mut initial = Vec::new();
@@ -191,6 +193,7 @@ impl<'d> Loader<'d> {
             shapes: std::mem::take(&mut self.shapes),
             bodies: std::mem::take(&mut self.bodies),
             welds,
+            joints,
             reels: std::mem::take(&mut self.reels),
             grips: std::mem::take(&mut self.grips),
             loads: std::mem::take(&mut self.loads),
@@ -226,6 +229,9 @@ impl<'d> Loader<'d> {
         }
         for (i, t) in root.tables("body").iter().enumerate() {
             self.add_name(t, "name", Named::Body(i));
+        }
+        for (i, t) in root.tables("joint").iter().enumerate() {
+            self.add_name(t, "name", Named::Joint(i));
         }
         if let Some((path, location)) = start {
             match SavedFile::read(path) {

@@ -44,5 +44,6 @@ sample_tests!(
     free_thread,
     capstan,
     rolling,
+    pendulum,
     heap
 );

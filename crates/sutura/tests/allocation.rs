@@ -237,7 +237,8 @@ fn a_reel_within_the_elements_that_there_were() {
 fn a_machine_of_joints_allocates_nothing() {
     for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
         let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
-        world.insert_shape(&ShapeSpec::fixed(Geometry::Plane, Pose::at(DVec3::Z * -0.1))).unwrap();
+        let floor = Geometry::Box { half_sides: DVec3::new(0.5, 0.5, 0.02) };
+        world.insert_shape(&ShapeSpec::fixed(floor, Pose::at(DVec3::Z * -0.12))).unwrap();
         let about_y = DQuat::from_rotation_x(-core::f64::consts::FRAC_PI_2);
         let mut above = None;
         let kinds = [JointKind::Hinge, JointKind::Ball, JointKind::Slider, JointKind::Fixed, JointKind::Hinge];

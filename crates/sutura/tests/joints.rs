@@ -91,7 +91,6 @@ fn a_pendulum_swings_as_the_elliptic_integral_has_it() {
             before = now;
         });
         let period = passes[2] - passes[0];
-        println!("angle {angle}: period {period} {wanted} error {:e}, off {off:e}", period / wanted - 1.0);
         assert!((period / wanted - 1.0).abs() < 5e-3, "{period} {wanted}");
         assert!(off < 1e-9, "{off:e}");
     }
@@ -112,7 +111,6 @@ fn a_double_pendulum_keeps_its_energy() {
         let drift = (energy(world) - before) / scale;
         (most, least) = (most.max(drift), least.min(drift));
     });
-    println!("energy drift {most:e} {least:e}");
     assert!(most < 1e-4 && least > -5e-3, "{most:e} {least:e}");
 }
 
@@ -142,7 +140,6 @@ fn a_conical_pendulum_goes_round_in_its_time() {
     });
     let period = TAU * world.time() / angle_gone;
     let pull = world.joint(joint).unwrap().force();
-    println!("period {period} {wanted} {:e}, height {height:e}, pull {pull}", period / wanted - 1.0);
     assert!((period / wanted - 1.0).abs() < 5e-3 && height < 1e-3 * l, "{period} {wanted} {height:e}");
     assert!((pull.z / (m * G) - 1.0).abs() < 5e-3);
     let inward = pull - DVec3::Z * pull.z;
@@ -186,7 +183,6 @@ fn bodies_fixed_to_each_other_move_as_one() {
             let turn = log(found.orientation * pose.orientation.conjugate()).length();
             ((found.position - pose.transform_point(DVec3::Z * z)).length(), turn)
         });
-        println!("fixed {substep}: {off:?}");
         assert!(off.iter().all(|(way, turn)| *way < 0.1 * bound && *turn < bound), "{off:?}");
     }
 }
@@ -203,8 +199,6 @@ fn a_slider_goes_down_an_incline() {
     let view = world.joint(joint).unwrap();
     let wanted = 0.5 * G * angle.sin();
     let mass = world.body(body).unwrap().mass().mass;
-    let across = view.force() - DVec3::Z * mass * G * angle.cos().powi(2);
-    println!("slid {} {wanted} {:e} across {across}", view.coordinate(), view.coordinate() / wanted - 1.0);
     assert!((view.coordinate() / wanted - 1.0).abs() < 1e-6);
     assert!((view.force().length() / (mass * G * angle.cos()) - 1.0).abs() < 1e-6);
     let turned = log(world.body(body).unwrap().pose().orientation).length();
@@ -223,13 +217,6 @@ fn a_limit_stops_a_hinge_and_bears_its_weight() {
         run(&mut world, 2.0, DT, |world, _| most = most.max(world.joint(joint).unwrap().coordinate()));
         let view = world.joint(joint).unwrap();
         let wanted = -world.body(body).unwrap().mass().mass * G * 0.1 * 0.5f64.cos();
-        println!(
-            "most {:e}, at {:e}, torque {} {wanted} {:e}",
-            most - 0.5,
-            view.coordinate() - 0.5,
-            view.limit_force(),
-            view.limit_force() / wanted - 1.0
-        );
         assert!(most < 0.5 + 1e-4, "{most}");
         assert!((view.coordinate() - 0.5).abs() < 1e-4);
         assert!((view.limit_force() / wanted - 1.0).abs() < 1e-3, "{} {wanted}", view.limit_force());
@@ -255,7 +242,6 @@ fn a_motor_keeps_to_its_torque_and_reaches_its_speed() {
             assert!((view.rate() - wanted).abs() < 1e-6 * speed, "{} {wanted} at {t}", view.rate());
         });
         let view = world.joint(joint).unwrap();
-        println!("rate {} force {:e} turned {}", view.rate(), view.motor_force(), view.coordinate());
         assert!(view.motor_force().abs() < 1e-6 * most);
         // 0.5 s at 20 rad/s^2, then 10 rad/s: more than a turn is counted.
         assert!((view.coordinate() - 7.5).abs() < 0.05, "{}", view.coordinate());
@@ -277,10 +263,8 @@ fn friction_of_a_joint_holds_and_brakes() {
         (view.coordinate(), view.friction_force() / torque, torque / inertia)
     };
     let (still, force, _) = run_with(1.01);
-    println!("held {still:e} {force}");
     assert!(still.abs() < 1e-9 && (force + 1.0).abs() < 1e-6, "{still:e} {force}");
     let (turned, force, rate) = run_with(0.5);
-    println!("turned {turned} {} {force}", 0.25 * rate * 0.01);
     assert!((turned / (0.25 * rate * 0.01) - 1.0).abs() < 0.02 && (force + 0.5).abs() < 1e-12);
 }
 
@@ -325,7 +309,6 @@ fn light_links_carry_a_heavy_end() {
     let squared = (q - (q * q - 4.0 * p * c).sqrt()) / (2.0 * p);
     let wanted = TAU / squared.sqrt() * (1.0 + angle * angle / 16.0);
     let period = passes[4] - passes[2];
-    println!("period {period} {wanted} {:e}, apart {off:e}", period / wanted - 1.0);
     assert!((period / wanted - 1.0).abs() < 5e-3, "{period} {wanted}");
     assert!(off < 1e-9, "{off:e}");
 }
@@ -355,7 +338,6 @@ fn a_chain_hangs_without_sag_and_its_top_bears_its_weight() {
     let pull = world.joint(joints[0]).unwrap().force();
     let sag =
         bodies.iter().zip(&before).map(|(b, x)| (world.body(*b).unwrap().center() - *x).length()).fold(0.0, f64::max);
-    println!("top {} {} sag {sag:e}", pull, mass * G);
     assert!((pull.z / (mass * G) - 1.0).abs() < 1e-6, "{pull} {}", mass * G);
     assert!(sag < 1e-6, "{sag:e}");
 }
@@ -371,7 +353,6 @@ fn a_turned_chain_swings_as_the_other_turned() {
         let end = world.body(bodies[19]).unwrap().center();
         (turn.conjugate() * end, turn.conjugate() * world.joint(joints[3]).unwrap().force())
     });
-    println!("{ends:?} {:e}", (ends[0].0 - ends[1].0).length());
     assert!((ends[0].0 - ends[1].0).length() < 1e-9);
     assert!((ends[0].1 - ends[1].1).length() < 1e-6 * ends[0].1.length());
 }
@@ -391,7 +372,6 @@ fn a_bar_rests_on_a_hinge_and_a_floor() {
     let moment: DVec3 = world.contacts().map(|c| (c.point - at).cross(-c.force)).sum();
     let hinge = world.joint(joint).unwrap().force();
     let off = (view.center() - at).cross(weight) + moment;
-    println!("weight {weight}: floor {floor}, hinge {hinge}, moment {off}");
     assert!(floor.z > 0.4 * weight.length());
     assert!((floor + hinge + weight).length() < 1e-5 * weight.length(), "{floor} {hinge} {weight}");
     assert!(off.y.abs() < 1e-5 * weight.length() * 0.1, "{off}");
@@ -413,20 +393,18 @@ fn a_closed_loop_of_hinges_moves_and_keeps_together() {
     }
     world.set_settings(Settings { gravity: DVec3::new(5.0, 0.0, -G), ..settings() }).unwrap();
     let before = energy(&world);
-    let (mut off, mut gain, mut iterations) = (0.0f64, 0.0f64, 0);
-    run(&mut world, 2.0, DT, |world, report| {
+    let (mut off, mut gain) = (0.0f64, 0.0f64);
+    run(&mut world, 2.0, DT, |world, _| {
         for j in world.view().joints() {
             let [a, b] = j.frames();
             off = off.max((a.position - b.position).length());
         }
         gain = gain.max(energy(world) - before);
-        iterations = iterations.max(report.newton_iterations);
     });
-    println!(
-        "apart {off:e}, gain {gain:e} of {before}, iterations {iterations}, angle {}",
-        world.joint(joints[0]).unwrap().coordinate()
-    );
     assert!(off < 1e-9, "{off:e}");
+    assert!(gain < 1e-4 * before.abs(), "{gain:e} of {before}");
+    let angle = world.joint(joints[0]).unwrap().coordinate();
+    assert!(angle.abs() > 0.3, "it moves: {angle}");
 }
 
 /// A chain that is let go sideways and whips: no step makes energy, whatever the method.
@@ -447,15 +425,13 @@ fn a_whipping_chain_gains_no_energy() {
             above = Some(body);
         }
         let scale = world.view().bodies().map(|b| b.mass().mass).sum::<f64>() * G * 0.12;
-        let (mut before, mut gain, mut iterations) = (energy(&world), 0.0f64, 0);
-        let start = before;
-        run(&mut world, 3.0, DT, |world, report| {
+        let (start, mut before, mut gain) = (energy(&world), energy(&world), 0.0f64);
+        run(&mut world, 3.0, DT, |world, _| {
             gain = gain.max((energy(world) - before) / scale);
             before = energy(world);
-            iterations = iterations.max(report.newton_iterations / report.substeps);
         });
-        println!("{integrator:?} {kind:?} gain {gain:e} left {} iterations {iterations}", (before - start) / scale);
-        assert!(gain < 1e-3, "{gain:e}");
+        assert!(gain < 3e-4, "{gain:e}");
+        assert!(before - start < -0.5 * scale, "{integrator:?}: {before} {start}");
     }
 }
 
@@ -618,6 +594,34 @@ fn joined_bodies_touch_where_they_are_to() {
             assert!((angle - 0.001 / 0.06).abs() < 2e-3, "{angle}");
         } else {
             assert!(angle > 0.5, "{angle}");
+        }
+    }
+}
+#[test]
+fn zz_time() {
+    for n in [10, 20, 40] {
+        for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
+            let mut world = World::new(Settings { integrator, ..settings() }).unwrap();
+            let mut above = None;
+            for k in 0..n {
+                let at = DVec3::X * (0.03 * (f64::from(k) + 0.5));
+                let body = world.insert_body(&bar(DVec3::new(0.015, 0.003, 0.003), Pose::at(at))).unwrap();
+                world
+                    .insert_joint(&join(
+                        &world,
+                        JointKind::Ball,
+                        [above, Some(body)],
+                        about_y(DVec3::X * (0.03 * f64::from(k))),
+                    ))
+                    .unwrap();
+                above = Some(body);
+            }
+            let t = std::time::Instant::now();
+            let mut it = 0;
+            for _ in 0..60 {
+                it += world.step(DT).newton_iterations;
+            }
+            println!("TIME {n} {integrator:?} {:?} a frame, {} iterations a frame", t.elapsed() / 60, it / 60);
         }
     }
 }

@@ -10,8 +10,8 @@
 //! order of elimination is stable (Vanderbei 1995), and the pivots of multipliers are negative. What is redundant is
 //! held by all that hold it.
 //!
-//! A force on an arm turns with the arm, which is a stiffness (Tournier et al. 2015). Its positive part is in the
-//! matrix.
+//! A force that stays as it is while its arm turns is a stiffness (Tournier et al. 2015). Where it is positive it is in
+//! the matrix, where it is negative as far as that stays positive.
 //!
 //! Motor and friction are multipliers too, of the rate along the axis, with a bound. A multiplier beyond its bound is
 //! put there and leaves the system until its rate says that it is too much. Limits open and close, so they are rows of
@@ -39,6 +39,9 @@ const REDUNDANT: f64 = 1e-10;
 /// their distance from the origin, whose digits they are made of.
 const EXACT: f64 = 1e-9;
 const ROUNDING: f64 = 1e-14;
+
+/// Part of its inertia over h^2 that a force which pushes toward a body may take off its stiffness about an axis.
+const WEAKENED: f64 = 0.25;
 
 /// Turn of a joined body that the next iteration may be expected to make \[rad\], and its move over its size.
 const STILL: f64 = 1e-8;
@@ -214,7 +217,8 @@ impl Joints {
             for (side, sign) in [(0, -1.0), (1, 1.0)] {
                 let Some(first) = a.first[side] else { continue };
                 let arm = meeting.frames[1].position - meeting.centers[side];
-                let stiffness = turning_stiffness(force * sign, arm);
+                let firm = |axis: DVec3| inertia_about(model, state, motion, joint.bodies[side], axis);
+                let stiffness = turning_stiffness(force * sign, arm, firm);
                 for i in 0..3 {
                     (0..3).for_each(|j| border.add_own(first + 3 + i, first + 3 + j, stiffness.col(j)[i]));
                 }
@@ -332,6 +336,14 @@ impl Stop {
     }
 }
 
+/// Largest c for which the inertia of a body over h^2 less c about an axis is positive.
+fn inertia_about(model: &Model, state: &State, motion: &Motion, body: Option<u32>, axis: DVec3) -> f64 {
+    let of = |slot: u32| Some((model.bodies.at(slot)?.mass.moments, state.bodies.at(slot)?.orientation));
+    let Some((moments, orientation)) = body.and_then(of) else { return 0.0 };
+    let own = orientation.conjugate() * axis;
+    motion.heavier[1] / (motion.span * motion.span * own.dot(own / moments))
+}
+
 fn drive(model: &Model, a: &Active, row: &Row) -> Option<Motor> {
     model.joints.at(a.slot).expect("listed").drives[row.drive?]
 }
@@ -367,18 +379,22 @@ fn rates(model: &Model, bodies: &Slots<BodyState>, motion: &Motion, slot: u32) -
     [velocity, q * ((q.conjugate() * momentum) / body.mass.moments)]
 }
 
-/// Stiffness against turning of a force that stays as it is and acts at the end of an arm, without its negative part.
-/// It is `(f . r) 1 - (f r^T + r f^T) / 2`: against turning across the plane of both, and within it against turning
-/// about the line across the bisector.
-fn turning_stiffness(force: DVec3, arm: DVec3) -> DMat3 {
+/// Stiffness against turning of a force that stays as it is and acts at the end of an arm: the symmetric part of
+/// `(f . r) 1 - f r^T`. Its axes are the normal of the plane of both, the bisector and what is across these. Where it
+/// is negative it takes a part of what `firm` says that there is at most.
+fn turning_stiffness(force: DVec3, arm: DVec3, firm: impl Fn(DVec3) -> f64) -> DMat3 {
     let size = force.length() * arm.length();
     if !(size > 0.0 && size.is_finite()) {
         return DMat3::ZERO;
     }
     let (f, r) = (force.normalize(), arm.normalize());
     let cos = f.dot(r);
-    let Some(bisector) = (f + r).try_normalize() else { return DMat3::ZERO };
-    let within = 0.5 * size * (1.0 + cos);
-    let across = f.cross(r).try_normalize().unwrap_or(DVec3::ZERO);
-    (DMat3::IDENTITY - outer(bisector, bisector)) * within + outer(across, across) * ((size * cos).max(0.0) - within)
+    let bisector = (f + r).try_normalize().unwrap_or_else(|| r.any_orthonormal_vector());
+    let normal = f.cross(r).try_normalize().unwrap_or_else(|| bisector.any_orthonormal_vector());
+    let axes = [
+        (normal, size * cos),
+        (bisector, 0.5 * size * (cos - 1.0)),
+        (bisector.cross(normal), 0.5 * size * (cos + 1.0)),
+    ];
+    axes.map(|(axis, k)| outer(axis, axis) * k.max(-WEAKENED * firm(axis))).into_iter().sum()
 }

@@ -597,31 +597,3 @@ fn joined_bodies_touch_where_they_are_to() {
         }
     }
 }
-#[test]
-fn zz_time() {
-    for n in [10, 20, 40] {
-        for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
-            let mut world = World::new(Settings { integrator, ..settings() }).unwrap();
-            let mut above = None;
-            for k in 0..n {
-                let at = DVec3::X * (0.03 * (f64::from(k) + 0.5));
-                let body = world.insert_body(&bar(DVec3::new(0.015, 0.003, 0.003), Pose::at(at))).unwrap();
-                world
-                    .insert_joint(&join(
-                        &world,
-                        JointKind::Ball,
-                        [above, Some(body)],
-                        about_y(DVec3::X * (0.03 * f64::from(k))),
-                    ))
-                    .unwrap();
-                above = Some(body);
-            }
-            let t = std::time::Instant::now();
-            let mut it = 0;
-            for _ in 0..60 {
-                it += world.step(DT).newton_iterations;
-            }
-            println!("TIME {n} {integrator:?} {:?} a frame, {} iterations a frame", t.elapsed() / 60, it / 60);
-        }
-    }
-}

@@ -245,7 +245,7 @@ macro_rules! state {
                     state.bodies = Slots::of_values(bodies);
                     let of_bodies = Vec::<Contact>::take(input)?;
                     let all: Vec<Contact> = state.contacts.iter().copied().chain(of_bodies).collect();
-                    state.contacts = sorted(all)?;
+                    state.contacts = sorted(&all)?;
                 }
                 if input.version == WITH_JOINTS {
                     let joints = Vec::<Option<JointState>>::take(input)?;
@@ -319,15 +319,15 @@ impl Bytes for Contacts {
         let thread = |element: u32, s: f64| Site::Thread { element, s };
         let threads = threads.into_iter().map(|(((a, b), (s, t)), rest)| contact(thread(a, s), thread(b, t), rest));
         let on = |(((shape, element), s), rest)| contact(thread(element, s), Site::Shape { shape }, rest);
-        sorted(threads.chain(shapes.into_iter().map(on)).collect())
+        sorted(&threads.chain(shapes.into_iter().map(on)).collect::<Vec<_>>())
     }
 }
 
 /// Contacts that are in the order in which they are written.
-fn sorted(all: Vec<Contact>) -> Result<Contacts, Error> {
+fn sorted(all: &[Contact]) -> Result<Contacts, Error> {
     let mut contacts = Contacts::default();
     contacts.set(all.iter().copied());
-    if contacts.iter().zip(&all).any(|(a, b)| a.order(b).is_ne()) {
+    if contacts.iter().zip(all).any(|(a, b)| a.order(b).is_ne()) {
         return Err(damaged("its contacts are out of order"));
     }
     Ok(contacts)

@@ -20,6 +20,7 @@
 use crate::handle::Slots;
 use crate::math::{max_or_nan, outer};
 use crate::model::Model;
+use crate::model::body::BodyModel;
 use crate::model::joint::{Along, JointModel, Meeting, Motor};
 use crate::motion::Motion;
 use crate::params;
@@ -133,7 +134,7 @@ impl Joints {
         for (slot, joint) in model.joints.iter() {
             let Some(last) = state.joints.at(slot) else { continue };
             let masses = || joint.bodies.iter().flatten().filter_map(|b| model.bodies.at(*b));
-            let size = masses().map(|b| b.size()).fold(f64::INFINITY, f64::min);
+            let size = masses().map(BodyModel::size).fold(f64::INFINITY, f64::min);
             let over = |sum: f64, heavier: f64| heavier / (sum * motion.span * motion.span);
             let scale = [
                 over(masses().map(|b| 1.0 / b.mass.mass).sum(), motion.heavier[0]),

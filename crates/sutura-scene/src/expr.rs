@@ -23,6 +23,7 @@ pub enum Named {
     Thread(usize),
     Shape(usize),
     Body(usize),
+    Joint(usize),
     Grip(usize),
     Probe(usize),
 }
@@ -79,6 +80,7 @@ pub enum Ref {
     Grip(usize),
     Shape(usize),
     Body(usize),
+    Joint(usize),
 }
 
 /// What an expression gives.

@@ -3,6 +3,7 @@
 mod bodies;
 mod cuts;
 mod happening;
+mod joints;
 mod things;
 mod watching;
 
@@ -147,6 +148,7 @@ impl<'d> Loader<'d> {
             }
             table.finish();
         }
+        let joints = read_all(root, "joint", |t| self.joint(t));
         self.reels = read_all(root, "reel", |t| self.reel(t));
 
         let mut initial = Vec::new();
@@ -208,6 +210,7 @@ impl<'d> Loader<'d> {
             shapes: std::mem::take(&mut self.shapes),
             bodies: std::mem::take(&mut self.bodies),
             welds,
+            joints,
             reels: std::mem::take(&mut self.reels),
             grips: std::mem::take(&mut self.grips),
             loads: std::mem::take(&mut self.loads),
@@ -243,6 +246,9 @@ impl<'d> Loader<'d> {
         }
         for (i, t) in root.tables("body").iter().chain(&root.tables("needle")).enumerate() {
             self.add_name(t, "name", Named::Body(i));
+        }
+        for (i, t) in root.tables("joint").iter().enumerate() {
+            self.add_name(t, "name", Named::Joint(i));
         }
         if let Some((path, location)) = start {
             match SavedFile::read(path) {

@@ -8,8 +8,8 @@ use crate::units::Unit;
 use std::path::{Path, PathBuf};
 use sutura::glam::DVec3;
 use sutura::{
-    BodySpec, Friction, Hold, Material, Place, Plasticity, ReelLaw, RodSpec, Settings, ShapeSpec, Shear, Stretch,
-    WeldRest,
+    BodySpec, Friction, Hold, JointKind, Material, Motor, Place, Plasticity, Pose, ReelLaw, RodSpec, Settings,
+    ShapeSpec, Shear, Stretch, WeldRest,
 };
 
 /// Most frames of a run: two days at 60 a second. What is recorded and probed is kept in memory.
@@ -38,6 +38,7 @@ pub struct Scene {
     /// Those of their own, then those of the bodies.
     pub(crate) shapes: Vec<ShapeDef>,
     pub(crate) bodies: Vec<BodyDef>,
+    pub(crate) joints: Vec<JointDef>,
     pub(crate) welds: Vec<WeldDef>,
     pub(crate) reels: Vec<ReelDef>,
     pub(crate) grips: Vec<String>,
@@ -99,6 +100,22 @@ pub(crate) struct BodyDef {
     pub held_by: Option<usize>,
     /// Point of a needle, in its frame.
     pub tip: Option<DVec3>,
+    pub location: Location,
+}
+
+#[derive(Debug, Clone)]
+pub(crate) struct JointDef {
+    pub kind: JointKind,
+    /// `None` is the world.
+    pub bodies: [Option<usize>; 2],
+    /// Its frame in the world at the beginning.
+    pub at: Pose,
+    pub limits: Option<[f64; 2]>,
+    pub motor: Option<Motor>,
+    pub friction: f64,
+    /// Of places and of turning.
+    pub compliance: [f64; 2],
+    pub touch: bool,
     pub location: Location,
 }
 

@@ -9,15 +9,16 @@ use crate::motion::{Motion, quintic};
 use crate::parted::Parting;
 use crate::report::KnotReport;
 use crate::saved::{Event, SavedFile};
-use crate::scene::{Action, LoadDef, Mover, Scene, Step};
+use crate::scene::{Action, JointDef, LoadDef, Mover, Scene, Step};
 use std::sync::Mutex;
 use sutura::glam::{DQuat, DVec3};
 use sutura::input::Recorder;
 use sutura::knot::Entries;
 use sutura::math::{exp, log};
 use sutura::{
-    Body, BodyMotion, BodyView, Drive, Error, Grip, GripSpec, Handle, Hold, Load, LoadKind, LoadSpec, Place, Pose,
-    Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldAnchor, WeldSpec,
+    Body, BodyMotion, BodyView, Drive, Error, Grip, GripSpec, Handle, Hold, Joint, JointKind, JointSpec, Load,
+    LoadKind, LoadSpec, Place, Pose, Reel, ReelSpec, Rod, RodView, Shape, ShapeMotion, StepReport, WeldAnchor,
+    WeldSpec,
 };
 
 /// A grip that holds.
@@ -143,6 +144,21 @@ pub fn lesser(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     }
 }
 
+/// Puts a joint in.
+fn join(world: &mut Recorder, bodies: &[Handle<Body>], joint: &JointDef) -> Result<Handle<Joint>, Error> {
+    let sides = joint.bodies.map(|b| b.map(|b| bodies[b]));
+    let spec = JointSpec {
+        compliance: joint.compliance[0],
+        angular_compliance: joint.compliance[1],
+        limits: joint.limits,
+        motor: joint.motor,
+        friction: joint.friction,
+        touch: joint.touch,
+        ..JointSpec::new(joint.kind, sides, world.joint_frames(sides, joint.at)?)
+    };
+    world.insert_joint(&spec)
+}
+
 /// The world with its names.
 pub struct Stage {
     pub world: Recorder,
@@ -153,6 +169,7 @@ pub struct Stage {
     pub bodies: Vec<Handle<Body>>,
     /// Points of needles in their frames.
     tips: Vec<Option<DVec3>>,
+    joints: Vec<Handle<Joint>>,
     reels: Vec<Handle<Reel>>,
     grips: Vec<Option<Held>>,
     loads: Vec<Option<Acting>>,
@@ -235,6 +252,10 @@ impl Stage {
                 weld.anchor.as_ref().map(|a| WeldAnchor { body: bodies[a.body], point: a.point, strength: a.strength });
             world.insert_weld(&WeldSpec { places, rest: weld.rest, anchor }).map_err(|e| at(&weld.location, e))?;
         }
+        let mut joints = Vec::new();
+        for joint in &scene.joints {
+            joints.push(join(&mut world, &bodies, joint).map_err(|e| at(&joint.location, e))?);
+        }
         let mut reels = Vec::new();
         for reel in &scene.reels {
             let spec = ReelSpec { rod: threads[reel.thread], at_end: reel.at_end, law: reel.law, supply: reel.supply };
@@ -252,6 +273,7 @@ impl Stage {
             shapes,
             bodies,
             tips: scene.bodies.iter().map(|b| b.tip).collect(),
+            joints,
             reels,
             grips: vec![None; scene.grips.len()],
             loads: vec![None; scene.loads.len()],
@@ -815,7 +837,7 @@ impl Stage {
         match r {
             Ref::On(t, at) => self.rod(t).map(|rod| (rod, crate::scene::engine_place(at, rod.rest_length()))),
             Ref::Grip(g) => self.grips[g].and_then(|h| Some((self.rod(h.thread)?, h.place))),
-            Ref::Thread(_) | Ref::Shape(_) | Ref::Body(_) => None,
+            Ref::Thread(_) | Ref::Shape(_) | Ref::Body(_) | Ref::Joint(_) => None,
         }
     }
     /// A number of one element, or its greatest magnitude over a whole thread.
@@ -879,8 +901,17 @@ impl Stage {
             Ref::Grip(g) => self.grips[g].and_then(|h| self.world.grip_wrench(h.handle).ok()).unwrap_or(none),
             Ref::Shape(s) => self.world.shape_wrench(self.shapes[s]).unwrap_or(none),
             Ref::Body(b) => self.world.body_wrench(self.bodies[b]).unwrap_or(none),
+            Ref::Joint(j) => self
+                .world
+                .joint(self.joints[j])
+                .map_or(none, |j| sutura::Wrench { force: j.force(), torque: j.torque() }),
             _ => none,
         }
+    }
+    /// Angle of a hinge, way of a slider.
+    fn coordinate(&self, r: Ref, kind: JointKind) -> f64 {
+        let Ref::Joint(j) = r else { return f64::NAN };
+        self.world.joint(self.joints[j]).ok().filter(|j| j.kind() == kind).map_or(f64::NAN, |j| j.coordinate())
     }
     fn gap(&self, a: usize, b: Ref) -> f64 {
         let Some(rod) = self.rod(a) else { return f64::NAN };
@@ -1117,6 +1148,8 @@ impl Live for Stage {
                     Some(r) => Value::Number(self.velocity(r).length()),
                 }
             }
+            Read::JointAngle => Value::Number(self.coordinate(place, JointKind::Hinge)),
+            Read::JointWay => Value::Number(self.coordinate(place, JointKind::Slider)),
             Read::Spin => Value::Number(match place {
                 Ref::Body(b) => self.body(b).map_or(f64::NAN, |b| b.angular_velocity().length()),
                 _ => f64::NAN,

@@ -45,5 +45,6 @@ sample_tests!(
     capstan,
     cut,
     rolling,
+    pendulum,
     heap
 );

@@ -95,6 +95,10 @@ pub(crate) fn attempt(step: &mut Step<'_, '_>, sub: Substep, method: Method) -> 
             return so_far;
         }
         if stage.last {
+            if method != Method::Euler && budget::joints_gain(model, origin, state) {
+                so_far.too_coarse = true;
+                return so_far;
+            }
             let last = sub.depth >= FINE.min(halvings);
             match budget::settle(model, state, &solver.motion, budget, origin, (sub.h, method, last)) {
                 Settled::Well => {}

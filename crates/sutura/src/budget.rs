@@ -23,7 +23,7 @@ use crate::model::shape::ShapeMotion;
 use crate::motion::Motion;
 use crate::params::{Integrator, OVERLAP};
 use crate::rod::length::LENGTH_TOLERANCE;
-use crate::state::{Contact, State};
+use crate::state::{BodyState, Contact, Site, State};
 use glam::{DMat3, DVec3};
 
 /// Rounding of an energy, over the energies that it is summed of: some hundred terms of some rounded numbers each.
@@ -39,6 +39,9 @@ const PASSES: u32 = 3;
 /// Gain of a substep of second order over the energy of the group beyond which it is not resolved in time, and implicit
 /// Euler takes it.
 const UNRESOLVED: f64 = 1e-3;
+
+/// The same of joined bodies, over their kinetic energy and what gravity does.
+const UNRESOLVED_JOINTS: f64 = 1e-4;
 
 /// Part of its energy that a group may be left with too much: Newton's iteration leaves some of that in what comes to
 /// rest.
@@ -107,6 +110,31 @@ pub(crate) enum Settled {
     Coarse,
     /// It moved to where energy is more than it had, even without any motion.
     Gained,
+}
+
+/// Whether joined bodies, which no motor drives and nothing touches, have gained more energy in a substep of second
+/// order than its error explains: they whip, and the substep does not resolve it.
+pub(crate) fn joints_gain(model: &Model, before: &State, after: &State) -> bool {
+    if before.joints.iter().any(|(_, j)| j.motor.is_some()) {
+        return false;
+    }
+    let (mut gained, mut scale) = (0.0, 0.0);
+    for (slot, body) in model.bodies.iter() {
+        let joined = model.joints.iter().any(|(_, j)| j.bodies.contains(&Some(slot)));
+        let (Some(was), Some(now), true) = (before.bodies.at(slot), after.bodies.at(slot), joined) else { continue };
+        let mass = &body.mass;
+        let kinetic = |b: &BodyState| {
+            let along = b.orientation.conjugate() * b.angular_momentum;
+            0.5 * (mass.mass * b.velocity.length_squared() + along.dot(along / mass.moments))
+        };
+        let fallen = mass.mass * model.settings.gravity.dot(now.position - was.position);
+        let [first, last] = [was, now].map(kinetic);
+        gained += last - first - fallen;
+        scale += last + first + fallen.abs();
+    }
+    let of_joined =
+        |c: &Contact| [c.a, c.b].into_iter().filter_map(Site::any_shape).any(|shape| model.body_of(shape).is_some());
+    gained > UNRESOLVED_JOINTS * scale && !after.contacts.iter().any(of_joined)
 }
 
 /// Takes off the state at the end of a substep what the substep has made, against that at its start, `before`. `last`

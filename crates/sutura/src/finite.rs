@@ -31,8 +31,12 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
     let bodies = state.bodies.iter().all(|(_, b)| {
         [b.position, b.velocity, b.angular_momentum, b.acceleration, b.torque].iter().all(|v| v.is_finite())
     });
+    let joints = state.joints.iter().all(|(_, j)| {
+        let along = [j.coordinate, j.drive[0], j.drive[1], j.stop];
+        j.force.is_finite() && j.torque.is_finite() && along.iter().all(|v| v.is_finite())
+    });
     let between = state.contacts.bodies().iter().all(|c| c.force().is_finite());
-    grips && bodies && between && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
+    grips && bodies && joints && between && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
 }
 
 /// Whether the energy of every rod and body is a finite number, and so all that is worked out from its state. (Elastic

@@ -12,6 +12,7 @@ use crate::math::Pose;
 use crate::model::body::{Body, BodyMotion, BodySpec, ColliderSpec};
 use crate::model::cut::Cut;
 use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec, Place};
+use crate::model::joint::{Joint, JointKind, JointModel, JointSpec, Motor};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
 use crate::model::rod::{Closure, RestShape, Rod, RodSpec, Stretch};
@@ -85,6 +86,12 @@ pub enum Input {
     BodyMotion(Handle<Body>, BodyMotion),
     /// [`World::set_body_pose`].
     BodyPose(Handle<Body>, Pose),
+    /// [`World::insert_joint`].
+    InsertJoint(JointSpec),
+    /// [`World::remove_joint`].
+    RemoveJoint(Handle<Joint>),
+    /// [`World::set_joint_motor`].
+    JointMotor(Handle<Joint>, Option<Motor>),
     /// [`World::step`] by a time \[s\], and the state hash that it left.
     Step(f64, u64),
 }
@@ -120,6 +127,9 @@ impl Input {
             Input::RemoveBody(body) => world.remove_body(*body)?,
             Input::BodyMotion(body, motion) => world.set_body_motion(*body, *motion)?,
             Input::BodyPose(body, pose) => world.set_body_pose(*body, *pose)?,
+            Input::InsertJoint(spec) => drop(world.insert_joint(spec)?),
+            Input::RemoveJoint(joint) => world.remove_joint(*joint)?,
+            Input::JointMotor(joint, motor) => world.set_joint_motor(*joint, *motor)?,
             Input::StepWork(most) => world.set_step_work(*most)?,
             Input::Step(dt, _) => return Ok(Some(world.step(*dt))),
         }
@@ -214,6 +224,12 @@ impl Recorder {
         set_body_motion(body: Handle<Body>, motion: BodyMotion) -> (), Input::BodyMotion(body, motion);
         /// [`World::set_body_pose`].
         set_body_pose(body: Handle<Body>, pose: Pose) -> (), Input::BodyPose(body, pose);
+        /// [`World::insert_joint`].
+        insert_joint(spec: &JointSpec) -> Handle<Joint>, Input::InsertJoint(spec.clone());
+        /// [`World::remove_joint`].
+        remove_joint(joint: Handle<Joint>) -> (), Input::RemoveJoint(joint);
+        /// [`World::set_joint_motor`].
+        set_joint_motor(joint: Handle<Joint>, motor: Option<Motor>) -> (), Input::JointMotor(joint, motor);
         /// [`World::set_step_work`].
         set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
@@ -281,7 +297,7 @@ impl Replayed<'_> {
     }
 }
 
-/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24, 25 and 34, version 4 also
+/// First bytes of a recording: name and version. Version 5 is the same without the inputs 24 and above, version 4 also
 /// without the input 23, version 3 also without drag and without [`ShapeSpec::open`], version 2 also without the inputs
 /// 21 and 22.
 const MAGIC: &[u8; 8] = b"SUTURAIN";
@@ -367,16 +383,13 @@ impl<T> Bytes for Handle<T> {
     }
 }
 
-impl<T: Bytes + Copy + Default, const N: usize> Bytes for [T; N] {
+impl<T: Bytes, const N: usize> Bytes for [T; N] {
     fn put(&self, out: &mut Vec<u8>) {
         self.iter().for_each(|v| v.put(out));
     }
     fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
-        let mut out = [T::default(); N];
-        for v in &mut out {
-            *v = T::take(input)?;
-        }
-        Ok(out)
+        let items = (0..N).map(|_| T::take(input)).collect::<Result<Vec<T>, Error>>()?;
+        Ok(items.try_into().unwrap_or_else(|_| unreachable!("as many as there are")))
     }
 }
 
@@ -491,11 +504,15 @@ structure!(RodSpec {
 });
 structure!(Closure { twist });
 structure!(ColliderSpec { geometry, pose, density, surface });
+structure!(Motor { speed, most });
+structure!(JointSpec { bodies, frames, kind, compliance, angular_compliance, limits, motor, friction, touch });
+structure!(JointModel { bodies, frames, kind, compliance, limits, friction, touch });
 structure!(BodySpec { pose, colliders, velocity, angular_velocity });
 structure!(WeldAnchor { body, point, strength });
 structure!(ReelSpec { rod, at_end, law, supply });
 structure!(GripSpec { rod, place, hold, drive, ramp });
 structure!(LoadSpec { rod, kind });
+variants!(JointKind { 0 => Fixed, 1 => Ball, 2 => Hinge, 3 => Slider });
 variants!(Shear { 0 => Poisson(nu), 1 => Modulus(g) });
 variants!(Section { 0 => Round, 1 => Ellipse(axes), 2 => Rectangle(sides) });
 variants!(Solver { 0 => Direct, 1 => Paper(numbers) });
@@ -544,4 +561,7 @@ variants!(Input {
     26 => BodyMotion(body, motion),
     27 => BodyPose(body, pose),
     34 => Cut(rod, place),
+    30 => InsertJoint(spec),
+    31 => RemoveJoint(joint),
+    32 => JointMotor(joint, motor),
 });

@@ -195,7 +195,9 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                 BodyStart {
                     target: now.position + now.velocity * (h * keep),
                     carried: now.velocity,
+                    kept: now.velocity * keep,
                     base: now.orientation,
+                    part: 0.5,
                     momentum: now.angular_momentum * keep_spin,
                 }
             }
@@ -208,7 +210,9 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
                 BodyStart {
                     target: base + carried * stage.span,
                     carried,
+                    kept: carried,
                     base: (second * (first * was.orientation)).normalize(),
+                    part: 1.0,
                     momentum: was.angular_momentum * keep_spin + times(was.torque, w0) + times(now.torque, w1),
                 }
             }
@@ -216,7 +220,7 @@ fn carry_bodies(model: &Model, state: &mut State, motion: &mut Motion, origin: &
         // What hangs on a thread starts as that does: it would stretch it.
         let hangs = model.welds.iter().any(|(_, w)| w.anchor.is_some_and(|a| a.body == slot));
         let fall = if hangs { DVec3::ZERO } else { model.settings.gravity * (stage.span * stage.span) };
-        let orientation = turned_freely(moments, start.base, start.momentum, stage.span);
+        let orientation = turned_freely(moments, &start, stage.span);
         let now = state.bodies.at_mut(slot).expect("living");
         if now.motion == Moved::Free {
             (now.position, now.orientation) = (start.target + fall, orientation);
@@ -234,7 +238,7 @@ fn leave_rates_of_bodies(model: &Model, state: &mut State, motion: &Motion, stag
         let (Some(body), Some(now), Some(start)) = (model.bodies.at(slot), state.bodies.at_mut(slot), start) else {
             continue;
         };
-        let reached = momentum(body.mass.moments, start.base, now, stage.span);
+        let reached = momentum(body.mass.moments, start, now, stage.span);
         let acceleration = (now.position - start.target) * (over * motion.heavier[0]);
         if model.settings.integrator == Integrator::TrBdf2 {
             now.acceleration = acceleration;
@@ -362,10 +366,12 @@ pub(crate) fn spins(model: &Model, origin: &State, state: &State, h: f64, e: usi
     [origin.angular_velocity[e] * half_damping(model, h).1, state.angular_velocity[e]]
 }
 
-/// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round.
+/// Whether other pieces touch now than at the start of the substep, or what slid sticks, or the other way round; and
+/// whether a joint has come to a limit, or its motor to its bound.
 pub(crate) fn touches_anew(before: &State, now: &State) -> bool {
     let pieces = |c: &Contact| (c.a.piece(), c.b.piece(), c.sliding);
     !before.contacts.iter().map(pieces).eq(now.contacts.iter().map(pieces))
+        || !before.joints.iter().map(|(_, j)| j.phase()).eq(now.joints.iter().map(|(_, j)| j.phase()))
 }
 
 #[cfg(test)]

@@ -49,6 +49,7 @@ pub use math::Pose;
 pub use model::body::{Body, BodyMotion, BodySpec, ColliderSpec, MassProperties};
 pub use model::cut::Cut;
 pub use model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
+pub use model::joint::{Joint, JointKind, JointSpec, Motor};
 pub use model::material::{Material, Plasticity, Shear};
 pub use model::needle::{NEEDLES, NeedleArc, NeedleCode, NeedlePoint, NeedleShape, NeedleSpec};
 pub use model::reel::{Reel, ReelLaw, ReelSpec};
@@ -60,5 +61,5 @@ pub use params::{Friction, Integrator, PaperSettings, Settings, Solver, SweepOrd
 pub use rejection::Rejection;
 pub use report::{Incident, IncidentKind, StepReport};
 pub use rod::energy::Energy;
-pub use view::{BodyView, ContactSide, ContactView, CutView, RodView, ShapeView, View, WeldView};
+pub use view::{BodyView, ContactSide, ContactView, CutView, JointView, RodView, ShapeView, View, WeldView};
 pub use world::{World, Wrench};

@@ -39,8 +39,13 @@ pub(crate) struct BodyStart {
     /// Where velocity alone would carry its center of mass, and the velocity there.
     pub target: DVec3,
     pub carried: DVec3,
+    /// The velocity that it ends with where nothing acts on it.
+    pub kept: DVec3,
     /// Orientation and angular momentum that the solve sets out with.
     pub base: DQuat,
+    /// Part of the turn from there at which the inertia is taken: what the mean velocity of a solve asks for, or the one
+    /// at its end.
+    pub part: f64,
     pub momentum: DVec3,
 }
 

@@ -104,6 +104,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             600.0 * model.mass.len() as f64 + 200.0 * (candidates.threads.len() + candidates.shapes.len()) as f64;
         row::shape::update_active_set(model, state, motion, rows, out.iterations == 1);
         brake::review(model, state, &mut rods.brakes);
+        rows.joints.review(model, state, motion);
         if out.iterations > 1 {
             rows.bodies.update(model, state, motion, candidates);
         }
@@ -140,7 +141,9 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
         rows.border.couple(&mut rods.step, false);
         row::system::solve(model, state, motion, rods, rows, effort);
         row::follow::follow(rods, rows, effort);
-        let by_others = work_of_others(rods, rows);
+        let [by_contacts, on_shared] = work_of_others(rods, rows);
+        let by_joints = rows.joints.work(rows.movers.count() + rows.welds.count(), &rows.border);
+        let by_others = [by_contacts, on_shared + by_joints];
         let trusted = !waiting || !rods.neglects(model, state, motion, h);
         let (turn, shift) = rods.largest_move(model);
         let turn = max_or_nan(turn, rows.welds.turn_squared(rows.movers.count(), &rows.border));
@@ -184,6 +187,7 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
             && brake::settled(model, state, &rods.brakes)
             && row::shape::converged(model, state, motion, rows, &rods.step, out.iterations)
             && row::body::converged(model, state, motion, &mut rows.bodies.rows)
+            && rows.joints.converged(model, state, motion, &rows.border, rate)
             && !row::extend(model, state, motion, candidates, rows)
         {
             out.converged = true;
@@ -254,9 +258,17 @@ fn limit(state: &State, motion: &Motion, rods: &RodScratch, candidates: &Candida
 
 /// Takes a part of the step, `anew` or back on the last one; the largest move of a pushed shape \[m\], and the work of
 /// the forces that the step builds up in the rods.
-fn apply(model: &Model, state: &mut State, rods: &mut RodScratch, rows: &Rows, scale: f64, anew: bool) -> (f64, f64) {
+fn apply(
+    model: &Model,
+    state: &mut State,
+    rods: &mut RodScratch,
+    rows: &mut Rows,
+    scale: f64,
+    anew: bool,
+) -> (f64, f64) {
     let built_up = rods.apply(model, state, scale, anew);
     let slid = rows.movers.apply(model, state, &rows.border, scale);
     rows.welds.apply(model, state, rows.movers.count(), &rows.border, scale);
+    rows.joints.apply(rows.movers.count() + rows.welds.count(), &rows.border, scale);
     (slid, built_up)
 }

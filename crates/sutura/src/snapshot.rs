@@ -9,11 +9,17 @@ use crate::model::reel::ReelLaw;
 use crate::model::rod::RodModel;
 use crate::model::weld::{Member, WeldModel};
 use crate::model::{Model, ShapeModel};
-use crate::state::{BodyState, Contact, Contacts, GripState, History, LoadState, Moved, ReelState, Site, State};
+use crate::state::{
+    BodyState, Contact, Contacts, GripState, History, JointState, LoadState, Moved, ReelState, Site, State,
+};
 use glam::{DQuat, DVec3};
 
 /// First bytes of a snapshot: name and version. What its world was made of follows, and the state.
 const MAGIC: &[u8; 8] = b"sutura\x05\0";
+
+/// Those where bodies have joints, which the state then has after the bodies.
+const JOINTED: &[u8; 8] = b"sutura\x06\0";
+const WITH_JOINTS: u32 = 6;
 
 /// Those of version 4, which says only what threads were made of.
 const MATERIALS: &[u8; 8] = b"sutura\x04\0";
@@ -193,6 +199,7 @@ variants!(LoadKind {
 structure!(Pose { position, orientation });
 structure!(MassProperties { mass, center, moments, axes });
 structure!(LoadState { rod, kind });
+structure!(JointState { coordinate, force, torque, motor, drive, stop, yields });
 variants!(Moved { 0 => Free, 1 => Driven { target }, 2 => Held { by, at } });
 structure!(BodyState { motion, position, orientation, velocity, angular_momentum, acceleration, torque });
 structure!(ReelState { rod, at_end, law, supply, nominal, fed, added });
@@ -213,12 +220,12 @@ structure!(GripState {
     force,
     torque
 });
-/// All of a state but bodies and their contacts, which a world without bodies does not write.
+/// All of a state but bodies, their contacts and their joints, which a world without them does not write.
 macro_rules! state {
     ($($field:ident),* $(,)?) => {
         impl Bytes for State {
             fn put(&self, out: &mut Vec<u8>) {
-                let State { $($field,)* bodies, weld_force } = self;
+                let State { $($field,)* bodies, weld_force, joints } = self;
                 $($field.put(out);)*
                 let bodies = bodies.values();
                 if !bodies.is_empty() {
@@ -226,10 +233,14 @@ macro_rules! state {
                     self.contacts.bodies().to_vec().put(out);
                     weld_force.put(out);
                 }
+                let joints = joints.values();
+                if !joints.is_empty() {
+                    joints.put(out);
+                }
             }
             fn take(input: &mut Reader<'_>) -> Result<Self, Error> {
-                let (bodies, weld_force) = (Slots::default(), Vec::new());
-                let mut state = State { $($field: Bytes::take(input)?,)* bodies, weld_force };
+                let (bodies, weld_force, joints) = (Slots::default(), Vec::new(), Slots::default());
+                let mut state = State { $($field: Bytes::take(input)?,)* bodies, weld_force, joints };
                 state.weld_force.resize(state.weld_orientation.len(), DVec3::ZERO);
                 if !input.left.is_empty() {
                     let bodies = Vec::<Option<BodyState>>::take(input)?;
@@ -241,6 +252,13 @@ macro_rules! state {
                     let all: Vec<Contact> = state.contacts.iter().copied().chain(of_bodies).collect();
                     state.contacts = sorted(&all)?;
                     state.weld_force = Bytes::take(input)?;
+                }
+                if input.version == WITH_JOINTS {
+                    let joints = Vec::<Option<JointState>>::take(input)?;
+                    if !matches!(joints.last(), Some(Some(_))) {
+                        return Err(damaged("its last joint is none"));
+                    }
+                    state.joints = Slots::of_values(joints);
                 }
                 Ok(state)
             }
@@ -470,13 +488,22 @@ pub(crate) fn hash_of(value: &impl Bytes) -> u64 {
 
 /// A snapshot of the state of a model.
 pub(crate) fn write(model: &Model, state: &State) -> Vec<u8> {
-    let mut out = MAGIC.to_vec();
+    let jointed = model.joints.iter().next().is_some();
+    let mut out = if jointed { JOINTED } else { MAGIC }.to_vec();
     Build::of(model, state).put(&mut out);
     state.put(&mut out);
     if model.bodies.iter().next().is_some() {
         bodies_of(model).put(&mut out);
     }
+    if jointed {
+        joints_of(model).put(&mut out);
+    }
     out
+}
+
+/// What joints join, and how, each as one number.
+pub(crate) fn joints_of(model: &Model) -> Vec<u64> {
+    model.joints.iter().map(|(_, j)| hash_of(j)).collect()
 }
 
 /// What bodies consist of and where threads are attached to them, each as one number.
@@ -497,6 +524,7 @@ pub(crate) struct Snapshot {
     /// What the world was built from, where it says so.
     pub build: Option<Build>,
     pub bodies: Vec<u64>,
+    pub joints: Vec<u64>,
     pub state: State,
 }
 
@@ -504,7 +532,8 @@ pub(crate) struct Snapshot {
 pub(crate) fn read(bytes: &[u8]) -> Result<Snapshot, Error> {
     let mut input = Reader { left: bytes, version: 0 };
     let (materials, build) = match &input.array::<8>()? {
-        MAGIC => {
+        magic @ (MAGIC | JOINTED) => {
+            input.version = if magic == JOINTED { WITH_JOINTS } else { 0 };
             let build = Build::take(&mut input)?;
             (Some(build.materials), Some(build))
         }
@@ -514,10 +543,11 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Snapshot, Error> {
     };
     let state = State::take(&mut input)?;
     let bodies = if state.bodies.len() > 0 { Bytes::take(&mut input)? } else { Vec::new() };
+    let joints = if state.joints.len() > 0 { Bytes::take(&mut input)? } else { Vec::new() };
     if !input.left.is_empty() {
         return Err(damaged(format!("{} bytes too many", input.left.len())));
     }
-    Ok(Snapshot { materials, build, bodies, state })
+    Ok(Snapshot { materials, build, bodies, joints, state })
 }
 
 /// What the threads of a model are made of and whether they stretch, as one number: tensions and accelerations of a

@@ -5,13 +5,14 @@ use crate::math::{Pose, log};
 use crate::model::Model;
 use crate::model::body::{BodyModel, MassProperties};
 use crate::model::cut::Faces;
+use crate::model::joint::{Along, JointKind, JointModel, Meeting};
 use crate::model::material::{Material, SectionStiffness};
 use crate::model::rod::{RodModel, Stretch};
 use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::{WeldModel, rest_across};
 use crate::rod::energy::{Energy, energy};
-use crate::state::{BodyState, Moved, Site, State};
+use crate::state::{BodyState, JointState, Moved, Site, State};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -173,6 +174,12 @@ impl<'a> View<'a> {
         let view = move |(slot, model)| Some(BodyView { model, state: state.bodies.at(slot)?, gravity, slot });
         bodies.iter().filter_map(view)
     }
+    /// The living joints in slot order.
+    pub fn joints(&self) -> impl Iterator<Item = JointView<'a>> + use<'a> {
+        let (model, state) = (self.model, self.state);
+        let view = move |(slot, joint)| Some(JointView { model, state, joint, now: state.joints.at(slot)?, slot });
+        model.joints.iter().filter_map(view)
+    }
     /// The living welds in slot order.
     pub fn welds(&self) -> impl Iterator<Item = WeldView<'a>> + use<'a> {
         let (model, state) = (self.model, self.state);
@@ -281,6 +288,79 @@ impl<'a> BodyView<'a> {
     /// Slots of its shapes ([`ShapeView::slot`]).
     pub fn shapes(&self) -> impl Iterator<Item = usize> + use<'a> {
         self.model.shapes.iter().map(|(slot, _)| *slot as usize)
+    }
+}
+
+/// One joint of bodies at one accepted state.
+#[derive(Clone, Copy)]
+pub struct JointView<'a> {
+    model: &'a Model,
+    state: &'a State,
+    joint: &'a JointModel,
+    now: &'a JointState,
+    slot: u32,
+}
+
+impl JointView<'_> {
+    /// Its slot, unique among living joints ([`Handle::index`](crate::Handle::index)).
+    pub fn slot(&self) -> usize {
+        self.slot as usize
+    }
+    /// What it leaves free.
+    pub fn kind(&self) -> JointKind {
+        self.joint.kind
+    }
+    /// Slots of the bodies that it joins; `None` is the world.
+    pub fn bodies(&self) -> [Option<usize>; 2] {
+        self.joint.bodies.map(|b| b.map(|slot| slot as usize))
+    }
+    /// Its frame on each side, `world_from_joint`. They meet, but for what the joint leaves free and its compliance.
+    pub fn frames(&self) -> [Pose; 2] {
+        self.meeting().frames
+    }
+    /// Angle of a hinge \[rad\], whole turns counted since it was put in, or way of a slider \[m\]; of the others 0.
+    pub fn coordinate(&self) -> f64 {
+        self.now.coordinate
+    }
+    /// Rate of the coordinate \[rad/s\], \[m/s\].
+    pub fn rate(&self) -> f64 {
+        let rates = self.joint.bodies.map(|b| {
+            b.and_then(|slot| View { model: self.model, state: self.state }.bodies().find(|b| b.slot == slot))
+                .map_or([DVec3::ZERO; 2], |b| [b.velocity(), b.angular_velocity()])
+        });
+        self.joint.kind.axis().map_or(0.0, |along| self.meeting().rate(along, rates))
+    }
+    /// Force of the joint on its second side, in world axes, at the origin of its second frame \[N\]: of all that it
+    /// does. The first side has the opposite one, at the same place.
+    pub fn force(&self) -> DVec3 {
+        self.in_world(self.now.force, |along| matches!(along, Along::Way(_)))
+    }
+    /// Torque of the joint on its second side about the origin of its second frame, in world axes \[N m\].
+    pub fn torque(&self) -> DVec3 {
+        self.in_world(self.now.torque, |along| matches!(along, Along::Turn(_)))
+    }
+    /// Of that along its axis what the motor does \[N m\], \[N\].
+    pub fn motor_force(&self) -> f64 {
+        self.now.drive[0]
+    }
+    /// What friction does.
+    pub fn friction_force(&self) -> f64 {
+        self.now.drive[1]
+    }
+    /// What a limit does, positive at the lower one.
+    pub fn limit_force(&self) -> f64 {
+        self.now.stop
+    }
+    fn in_world(&self, held: DVec3, is: impl Fn(Along) -> bool) -> DVec3 {
+        let along = if self.joint.kind.axis().is_some_and(is) {
+            self.now.drive[0] + self.now.drive[1] + self.now.stop
+        } else {
+            0.0
+        };
+        self.meeting().frames[0].orientation * (held + DVec3::Z * along)
+    }
+    fn meeting(&self) -> Meeting {
+        self.joint.meeting(&self.state.bodies)
     }
 }
 

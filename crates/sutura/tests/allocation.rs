@@ -8,8 +8,9 @@ mod support;
 use support::{overhand, quiet, t1};
 use sutura::glam::{DQuat, DVec3};
 use sutura::{
-    Drive, Friction, Geometry, GripSpec, Handle, Hold, Incident, IncidentKind, Integrator, LoadKind, LoadSpec,
-    Material, Place, Pose, ReelLaw, ReelSpec, RodSpec, Settings, ShapeSpec, Stretch, WeldSpec, World,
+    BodySpec, Drive, Friction, Geometry, GripSpec, Handle, Hold, Incident, IncidentKind, Integrator, JointKind,
+    JointSpec, LoadKind, LoadSpec, Material, Motor, Place, Pose, ReelLaw, ReelSpec, RodSpec, Settings, ShapeSpec,
+    Stretch, WeldSpec, World,
 };
 
 const DT: f64 = 1.0 / 60.0;
@@ -229,4 +230,36 @@ fn a_reel_within_the_elements_that_there_were() {
     });
     assert!(most > 50, "{most}");
     assert_eq!(second.allocations, 0, "{second:?}");
+}
+
+/// Joints of every kind, with a motor, friction, limits that are met, and a floor.
+#[test]
+fn a_machine_of_joints_allocates_nothing() {
+    for integrator in [Integrator::ImplicitEuler, Integrator::TrBdf2] {
+        let mut world = World::new(Settings { integrator, ..Settings::default() }).unwrap();
+        let floor = Geometry::Box { half_sides: DVec3::new(0.5, 0.5, 0.02) };
+        world.insert_shape(&ShapeSpec::fixed(floor, Pose::at(DVec3::Z * -0.12))).unwrap();
+        let about_y = DQuat::from_rotation_x(-core::f64::consts::FRAC_PI_2);
+        let mut above = None;
+        let kinds = [JointKind::Hinge, JointKind::Ball, JointKind::Slider, JointKind::Fixed, JointKind::Hinge];
+        for (k, kind) in kinds.into_iter().enumerate() {
+            let x = 0.04 * k as f64;
+            let half_sides = DVec3::new(0.02, 0.006, 0.004);
+            let bar = BodySpec::solid(Geometry::Box { half_sides }, 1000.0, Pose::at(DVec3::X * (x + 0.02)));
+            let body = world.insert_body(&bar).unwrap();
+            let sides = [above, Some(body)];
+            let frames = world.joint_frames(sides, Pose::new(DVec3::X * x, about_y)).unwrap();
+            let mut spec = JointSpec::new(kind, sides, frames);
+            match k {
+                0 => spec.motor = Some(Motor { speed: -4.0, most: 0.02 }),
+                2 => spec.limits = Some([-2e-3, 2e-3]),
+                4 => (spec.limits, spec.friction) = (Some([-0.2, 0.3]), 1e-4),
+                _ => {}
+            }
+            world.insert_joint(&spec).unwrap();
+            above = Some(body);
+        }
+        let second = second_run(&mut world, 90, |_, _| {});
+        assert_eq!((second.allocations, second.steps), (0, 0), "{integrator:?}: {second:?}");
+    }
 }

@@ -43,6 +43,8 @@ pub enum Read {
     Writhe,
     Speed,
     Spin,
+    JointAngle,
+    JointWay,
     Momentum,
     Contacts,
     Incidents,
@@ -95,22 +97,27 @@ pub(super) enum Wants {
     GripOrSolid,
     ThreadOrSolid,
     Body,
+    Joint,
+    /// A grip, a shape, a body or a joint.
+    Acting,
 }
 
 impl Wants {
     pub fn takes(self, thing: Ref) -> bool {
         match self {
-            Wants::Place => !matches!(thing, Ref::Thread(_)),
+            Wants::Place => !matches!(thing, Ref::Thread(_) | Ref::Joint(_)),
             Wants::OnThread => matches!(thing, Ref::On(..) | Ref::Grip(_)),
             Wants::OnThreadOrAll => matches!(thing, Ref::On(..) | Ref::Grip(_) | Ref::Thread(_)),
             Wants::Moving => matches!(thing, Ref::On(..) | Ref::Grip(_) | Ref::Body(_)),
-            Wants::MovingOrAll => !matches!(thing, Ref::Shape(_)),
+            Wants::MovingOrAll => !matches!(thing, Ref::Shape(_) | Ref::Joint(_)),
             Wants::Thread => matches!(thing, Ref::Thread(_)),
             Wants::ThreadOrBody => matches!(thing, Ref::Thread(_) | Ref::Body(_)),
             Wants::GripOrBody => matches!(thing, Ref::Grip(_) | Ref::Body(_)),
             Wants::GripOrSolid => matches!(thing, Ref::Grip(_) | Ref::Shape(_) | Ref::Body(_)),
             Wants::ThreadOrSolid => matches!(thing, Ref::Thread(_) | Ref::Shape(_) | Ref::Body(_)),
             Wants::Body => matches!(thing, Ref::Body(_)),
+            Wants::Joint => matches!(thing, Ref::Joint(_)),
+            Wants::Acting => matches!(thing, Ref::Grip(_) | Ref::Shape(_) | Ref::Body(_) | Ref::Joint(_)),
         }
     }
     pub fn words(self) -> &'static str {
@@ -126,6 +133,8 @@ impl Wants {
             Wants::GripOrSolid => "a grip, a shape or a body",
             Wants::ThreadOrSolid => "a thread, a shape or a body",
             Wants::Body => "a body",
+            Wants::Joint => "a joint",
+            Wants::Acting => "a grip, a shape, a body or a joint",
         }
     }
 }
@@ -181,9 +190,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
     f("torsion", Read::Torsion, &[Wants::OnThreadOrAll], 1, Gives::Number(Dim::TORQUE)),
     f("curvature", Read::Curvature, &[Wants::OnThreadOrAll], 1, Gives::Number(Dim::CURVATURE)),
     f("twist_rate", Read::TwistRate, &[Wants::OnThread], 1, Gives::Number(Dim::CURVATURE)),
-    f("force", Read::Force, &[Wants::GripOrSolid], 1, Gives::Vector(Dim::FORCE)),
-    f("torque", Read::Torque, &[Wants::GripOrSolid], 1, Gives::Vector(Dim::TORQUE)),
-    f("wrench", Read::Wrench, &[Wants::GripOrSolid], 1, Gives::Columns(WRENCH)),
+    f("force", Read::Force, &[Wants::Acting], 1, Gives::Vector(Dim::FORCE)),
+    f("torque", Read::Torque, &[Wants::Acting], 1, Gives::Vector(Dim::TORQUE)),
+    f("wrench", Read::Wrench, &[Wants::Acting], 1, Gives::Columns(WRENCH)),
     f("mass", Read::Mass, &[Wants::Body], 1, Gives::Number(Dim::MASS)),
     f("center", Read::Center, &[Wants::Body], 1, Gives::Vector(Dim::LENGTH)),
     f("tip", Read::Tip, &[Wants::Body], 1, Gives::Vector(Dim::LENGTH)),
@@ -203,6 +212,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     f("writhe", Read::Writhe, &[Wants::Thread], 1, Gives::Number(Dim::NUMBER)),
     f("speed", Read::Speed, &[Wants::MovingOrAll], 0, Gives::Number(Dim::SPEED)),
     f("spin", Read::Spin, &[Wants::Body], 1, Gives::Number(Dim::SPIN)),
+    f("joint_angle", Read::JointAngle, &[Wants::Joint], 1, Gives::Number(Dim::ANGLE)),
+    f("joint_way", Read::JointWay, &[Wants::Joint], 1, Gives::Number(Dim::LENGTH)),
     f("momentum", Read::Momentum, &[Wants::ThreadOrBody], 0, Gives::Vector(Dim::MOMENTUM)),
     f("contacts", Read::Contacts, &[], 0, Gives::Number(Dim::NUMBER)),
     f("incidents", Read::Incidents, &[], 0, Gives::Number(Dim::NUMBER)),

@@ -369,6 +369,7 @@ impl Parser<'_> {
             Some(Named::Grip(g)) => Ref::Grip(g),
             Some(Named::Shape(s)) => Ref::Shape(s),
             Some(Named::Body(b)) => Ref::Body(b),
+            Some(Named::Joint(j)) => Ref::Joint(j),
             Some(_) => return Err((format!("`{word}` is neither a thread, a grip, a shape nor a body"), None)),
             None => {
                 let known = self.names.which(|n| !matches!(n, Named::Probe(_)));

@@ -290,7 +290,7 @@ pub(crate) fn detect(model: &Model, state: &State, motion: &Motion, candidates: 
             let moves = [first, second].iter().any(|s| s.body.is_some_and(|b| state.gives_way(b)));
             let near = moves && (*lo - room).cmple(*other_hi).all() && (*hi + room).cmpge(*other_lo).all();
             let root = |s: &ShapeModel| s.body.map(|b| state.root_of(b));
-            if near && root(first) != root(second) {
+            if near && root(first) != root(second) && !model.apart(first.body, second.body) {
                 solids.push((a, b));
             }
         }

@@ -4,6 +4,7 @@ pub mod body;
 pub(crate) mod collider;
 pub mod cut;
 pub mod grip;
+pub mod joint;
 pub mod material;
 pub mod mesh;
 pub mod needle;
@@ -20,6 +21,7 @@ use body::BodyModel;
 use cut::Faces;
 use glam::{DQuat, DVec3};
 use grip::{LoadKind, LoadState};
+use joint::JointModel;
 use material::{Material, SectionStiffness};
 use rod::{RodModel, Stretch};
 use section::Factors;
@@ -40,6 +42,7 @@ pub struct Model {
     pub(crate) rods: Slots<RodModel>,
     pub(crate) shapes: Slots<ShapeModel>,
     pub(crate) bodies: Slots<BodyModel>,
+    pub(crate) joints: Slots<JointModel>,
     pub(crate) welds: Slots<WeldModel>,
     /// Of each cut the two ends that it made, while both threads are there.
     pub(crate) faces: Vec<Faces>,
@@ -123,6 +126,11 @@ impl Model {
     /// The body that a shape is part of.
     pub(crate) fn body_of(&self, shape: u32) -> Option<&BodyModel> {
         self.bodies.at(self.shapes.at(shape)?.body?)
+    }
+    /// Whether two bodies are joined so that they do not touch each other.
+    pub(crate) fn apart(&self, a: Option<u32>, b: Option<u32>) -> bool {
+        let joins = |j: &JointModel| !j.touch && (j.bodies == [a, b] || j.bodies == [b, a]);
+        a.is_some() && b.is_some() && self.joints.iter().any(|(_, j)| joins(j))
     }
     /// Where a shape is in its body.
     pub(crate) fn local_of(&self, shape: u32) -> Option<&crate::math::Pose> {

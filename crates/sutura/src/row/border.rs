@@ -7,7 +7,8 @@
 //! ```
 //!
 //! and are eliminated last: `dy = (D - B^T H^-1 B)^-1 (s - B^T z)`, `dz = z - H^-1 B dy` with `z = H^-1 r`. What an
-//! unknown is and which forces act on it is in [`movers`](crate::row::movers) and [`weld`](crate::row::weld).
+//! unknown is and which forces act on it is in [`movers`](crate::row::movers), [`weld`](crate::row::weld) and
+//! [`joint`](crate::row::joint). The last of them may be multipliers of constraints, whose pivots are negative.
 
 use crate::math::solve_dense;
 use crate::rod::constraint::NodeConstraint;
@@ -37,10 +38,12 @@ struct Column {
 pub(crate) struct Border {
     columns: Vec<Column>,
     count: usize,
+    /// The first multiplier.
+    multipliers: usize,
     /// D, and the Schur complement, row after row.
     own: Vec<f64>,
     schur: Vec<f64>,
-    /// The factor of the Schur complement where it is positive.
+    /// The factor of the Schur complement where its pivots have the signs that they should have.
     factor: Ldl,
     positive: bool,
     dense: Vec<f64>,
@@ -77,9 +80,11 @@ fn respond_together(
 }
 
 impl Border {
-    /// Makes `count` unknowns that nothing links or pushes. Their last steps, and the contact forces found in them, are
-    /// kept.
-    pub fn clear(&mut self, count: usize) {
+    /// Makes `moving` unknowns that nothing links or pushes, and multipliers after them. Their last steps, and the
+    /// contact forces found in them, are kept.
+    pub fn clear(&mut self, moving: usize, multipliers: usize) {
+        let count = moving + multipliers;
+        self.multipliers = moving;
         if self.columns.len() < count {
             self.columns.resize_with(count, Column::default);
         }
@@ -149,7 +154,8 @@ impl Border {
     }
 
     /// Takes what is held out of B and finds the responses; the rods' system is factored. `sixes` are unknowns of which
-    /// six at a time are linked to much the same nodes. False when the whole is not positive definite.
+    /// six at a time are linked to much the same nodes. False when the whole is not positive definite, but for the
+    /// multipliers.
     pub fn factor(
         &mut self,
         system: &System,
@@ -193,7 +199,9 @@ impl Border {
             }
         }
         self.factor.clear();
-        self.positive = (0..n).all(|i| self.factor.push(self.schur[i * n..i * n + i + 1].iter().copied()));
+        let sign = |i: usize| if i < self.multipliers { 1.0 } else { -1.0 };
+        self.positive =
+            (0..n).all(|i| self.factor.push_signed(self.schur[i * n..i * n + i + 1].iter().copied(), sign(i)));
         self.positive
     }
 
@@ -225,12 +233,12 @@ impl Border {
         if unknowns.len() == n {
             return;
         }
-        let Border { part, schur, .. } = self;
+        let Border { part, schur, multipliers, .. } = self;
         part.clear();
-        self.part_positive = unknowns
-            .iter()
-            .enumerate()
-            .all(|(k, i)| part.push(unknowns[..=k].iter().map(|j| schur[*i as usize * n + *j as usize])));
+        let sign = |i: u32| if (i as usize) < *multipliers { 1.0 } else { -1.0 };
+        self.part_positive = unknowns.iter().enumerate().all(|(k, i)| {
+            part.push_signed(unknowns[..=k].iter().map(|j| schur[*i as usize * n + *j as usize]), sign(*i))
+        });
     }
 
     /// `schur^-1 v` for a vector over these unknowns.
@@ -272,9 +280,15 @@ impl Border {
         self.small = small;
     }
 
-    /// Work of the forces on the unknowns, without those of the small contact problem, along their last step.
+    /// Work of the forces on what moves, without those of the small contact problem, along its last step.
     pub fn work(&self) -> f64 {
-        self.columns[..self.count].iter().map(|c| c.right * c.step).sum()
+        self.columns[..self.multipliers].iter().map(|c| c.right * c.step).sum()
+    }
+
+    /// What the change of a multiplier in the last step takes off the work of the forces along it.
+    pub fn work_of_constraint(&self, k: usize) -> f64 {
+        let c = &self.columns[k];
+        c.step * (c.right - self.own[k * self.count + k] * c.step)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Contacts as forces: thread on thread ([`thread`], coupled through the rods' compliance), thread on shape ([`shape`]:
 //! firm in the rods' matrix, light in the small problem), and bodies on each other and on shapes ([`body`]). And what
-//! rods share, at the [`border`] of their system: pushed shapes, free bodies and welds.
+//! rods share, at the [`border`] of their system: pushed shapes, free bodies, welds, and the joints of bodies.
 
 pub(crate) mod active_set;
 pub(crate) mod body;
@@ -8,6 +8,7 @@ pub(crate) mod border;
 pub(crate) mod delassus;
 pub(crate) mod dense;
 pub(crate) mod follow;
+pub(crate) mod joint;
 pub(crate) mod ldl;
 pub(crate) mod movers;
 pub(crate) mod shape;
@@ -31,6 +32,7 @@ pub(crate) struct Rows {
     pub bodies: body::BodyRows,
     pub movers: movers::Movers,
     pub welds: weld::Welds,
+    pub joints: joint::Joints,
     pub border: border::Border,
     pub solver: system::ContactSystem,
     pub follow: follow::Follow,
@@ -40,7 +42,7 @@ pub(crate) struct Rows {
 
 impl Rows {
     pub fn is_empty(&self) -> bool {
-        self.shapes.is_empty() && self.threads.is_empty() && self.bodies.rows.is_empty()
+        self.shapes.is_empty() && self.threads.is_empty() && self.bodies.rows.is_empty() && self.joints.stops.is_empty()
     }
 
     /// Whether the small problem was solved well enough for the step to count.
@@ -78,6 +80,7 @@ pub(crate) fn prepare(
     thread::prepare(model, state, motion, candidates, rows);
     shape::prepare(model, state, motion, candidates, rows, length);
     rows.bodies.prepare(model, state, motion, candidates);
+    rows.joints.begin(model, state, motion, &rows.movers);
 }
 
 /// Adds rows that the iterate calls for. Whether there are any.
@@ -98,4 +101,5 @@ pub(crate) fn store(model: &Model, state: &mut State, motion: &Motion, rows: &mu
         &mut bodies.rows,
     )));
     state.contacts = contacts;
+    rows.joints.store(model, state);
 }

@@ -10,12 +10,13 @@
 //! ```
 //!
 //! its angular momentum keeps to L = L0 + h tau: momentum is kept exactly, and a free top is of second order in h.
-//! The matrix has R_m I R_m^T / h^2, which leaves out a part of the order h |Omega|.
+//! The matrix has R_m I R_m^T / h^2, which leaves out a part of the order h |Omega|. In the methods with two solves
+//! Omega is the velocity at the end of a solve, and R_m the orientation there.
 
 use crate::math::{exp, log, skew};
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
-use crate::motion::Motion;
+use crate::motion::{BodyStart, Motion};
 use crate::row::border::Border;
 use crate::row::side::Moves;
 use crate::state::{BodyState, Moved, State};
@@ -54,33 +55,32 @@ pub(crate) struct Movers {
 /// Unknowns of a body.
 const SIX: usize = 6;
 
-/// Mean orientation, inertia about it in world axes and angular momentum of a body that has come from `base` to `q`
-/// within `span`.
-fn rotation(moments: DVec3, base: DQuat, q: DQuat, span: f64) -> (DMat3, DVec3) {
-    let turn = log(base.conjugate() * q);
-    let middle = DMat3::from_quat(base * exp(turn * 0.5));
+/// Inertia in world axes and angular momentum of a body that has come to `q` within `span`.
+fn rotation(moments: DVec3, start: &BodyStart, q: DQuat, span: f64) -> (DMat3, DVec3) {
+    let turn = log(start.base.conjugate() * q);
+    let middle = DMat3::from_quat(start.base * exp(turn * start.part));
     let inertia = middle * DMat3::from_diagonal(moments) * middle.transpose();
     (inertia, middle * (moments * turn) / span)
 }
 
-/// Orientation after `span` of a body without torque that has this angular momentum.
-pub(crate) fn turned_freely(moments: DVec3, base: DQuat, momentum: DVec3, span: f64) -> DQuat {
+/// Orientation after `span` of a body without torque.
+pub(crate) fn turned_freely(moments: DVec3, start: &BodyStart, span: f64) -> DQuat {
     let mut turn = DVec3::ZERO;
     for _ in 0..20 {
-        let middle = base * exp(turn * 0.5);
-        let next = (middle.conjugate() * momentum) / moments * span;
+        let middle = start.base * exp(turn * start.part);
+        let next = (middle.conjugate() * start.momentum) / moments * span;
         let done = (next - turn).length() <= 1e-15 * next.length();
         turn = next;
         if done {
             break;
         }
     }
-    (base * exp(turn)).normalize()
+    (start.base * exp(turn)).normalize()
 }
 
-/// Angular momentum of a body that has come from `base` within `span`.
-pub(crate) fn momentum(moments: DVec3, base: DQuat, body: &BodyState, span: f64) -> DVec3 {
-    rotation(moments, base, body.orientation, span).1
+/// Angular momentum of a body that has come to where it is within `span`.
+pub(crate) fn momentum(moments: DVec3, start: &BodyStart, body: &BodyState, span: f64) -> DVec3 {
+    rotation(moments, start, body.orientation, span).1
 }
 
 /// Puts the shapes of a body where it is.
@@ -190,13 +190,13 @@ impl Movers {
         let span = motion.span;
         for Mover { slot, first, root, center } in &mut self.bodies {
             let first = *first;
-            let (Some(body), Some(start)) = (state.bodies.at(*slot), motion.bodies[*slot as usize]) else { continue };
+            let (Some(body), Some(start)) = (state.bodies.at(*slot), &motion.bodies[*slot as usize]) else { continue };
             let mass = &model.bodies.at(*slot).expect("listed").mass;
             *center = state.bodies.at(*root).map_or(body.position, |b| b.position);
             let arm = body.position - *center;
             let w = mass.mass * motion.heavier[0] / (span * span);
             let force = model.settings.gravity * mass.mass + (start.target - body.position) * w;
-            let (inertia, momentum) = rotation(mass.moments, start.base, body.orientation, span);
+            let (inertia, momentum) = rotation(mass.moments, start, body.orientation, span);
             let over = motion.heavier[1] / (span * span);
             let mut torque = (start.momentum - momentum) * (motion.heavier[1] / span);
             if root != slot {

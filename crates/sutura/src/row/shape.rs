@@ -623,8 +623,10 @@ pub(crate) fn assemble(
     first: bool,
 ) {
     let RodScratch { system, rhs, .. } = rods;
-    rows.border.clear(rows.movers.count() + rows.welds.count());
+    let moving = rows.movers.count() + rows.welds.count();
+    rows.border.clear(moving, rows.joints.count());
     rows.movers.assemble(model, state, motion, &mut rows.border);
+    rows.joints.assemble(model, state, motion, moving, &mut rows.border);
     for row in &mut rows.shapes {
         if !row.firm {
             evaluate(model, state, motion, row);

@@ -19,7 +19,7 @@ use crate::row::border::Border;
 use crate::row::dense::Dense;
 use crate::row::side::{Endpoint, Side};
 use crate::row::sparse::Sparse;
-use crate::row::{Rows, body, shape, thread};
+use crate::row::{Rows, body, joint, shape, thread};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DVec3};
@@ -30,6 +30,8 @@ pub(crate) enum Source {
     Thread(u32),
     Shape(u32),
     Body(u32),
+    /// Of a joint.
+    Limit(u32),
 }
 
 /// One contact.
@@ -293,6 +295,7 @@ fn find_islands(coupling: &mut ContactSystem, rods: &[(Range<usize>, Range<usize
         Source::Thread(k) => (e.island, 0, k),
         Source::Shape(k) => (e.island, 1, k),
         Source::Body(k) => (e.island, 2, k),
+        Source::Limit(k) => (e.island, 3, k),
     });
     if islands.len() < root.len() {
         islands.resize_with(root.len(), Island::default);
@@ -389,6 +392,7 @@ pub(crate) fn solve(
     thread::add_entries(state, motion, step, &mut rows.threads, entries);
     shape::add_entries(state, motion, step, &mut rows.shapes, (&rows.movers, &rows.border), entries);
     body::add_entries(model, state, motion, &mut rows.bodies.rows, (&rows.movers, &rows.border), entries);
+    rows.joints.add_entries(model, state, &rows.border, entries);
     rows.solver.left = 0.0;
     if rows.solver.entries.is_empty() {
         return;
@@ -458,7 +462,7 @@ pub(crate) fn solve(
     right.clear();
     right.resize(step.len(), DVec3::ZERO);
     load(entries, force, &mut rows.border, right);
-    hand_over(entries, force, &mut rows.threads, &mut rows.shapes, &mut rows.bodies.rows);
+    hand_over(entries, force, (&mut rows.threads, &mut rows.shapes), (&mut rows.bodies.rows, &mut rows.joints.stops));
     respond(rods, system, constraint, &mut rows.border, right);
     for (z, r) in step.iter_mut().zip(right.iter()) {
         *z += *r;
@@ -555,7 +559,12 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
         for (z, r) in right.iter_mut().zip(more.iter()) {
             *z += *r;
         }
-        hand_over(entries, force, &mut rows.threads, &mut rows.shapes, &mut rows.bodies.rows);
+        hand_over(
+            entries,
+            force,
+            (&mut rows.threads, &mut rows.shapes),
+            (&mut rows.bodies.rows, &mut rows.joints.stops),
+        );
     }
     rows.border.add_steps(steps);
     for (z, r) in step.iter_mut().zip(right.iter()) {
@@ -567,9 +576,8 @@ pub(crate) fn again(rods: &mut RodScratch, rows: &mut Rows, effort: &mut Effort,
 fn hand_over(
     entries: &mut [Entry],
     force: &[f64],
-    threads: &mut [thread::ThreadRow],
-    shapes: &mut [shape::ShapeRow],
-    bodies: &mut [body::BodyRow],
+    (threads, shapes): (&mut [thread::ThreadRow], &mut [shape::ShapeRow]),
+    (bodies, stops): (&mut [body::BodyRow], &mut [joint::Stop]),
 ) {
     for (entry, f) in entries.iter_mut().zip(force.chunks_exact(3)) {
         entry.force = DVec3::from_slice(f);
@@ -577,6 +585,7 @@ fn hand_over(
             Source::Thread(k) => threads[k as usize].force = entry.force,
             Source::Shape(k) => shapes[k as usize].solved(entry.force),
             Source::Body(k) => bodies[k as usize].force = entry.force,
+            Source::Limit(k) => stops[k as usize].force = entry.force.x,
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::handle::Slots;
 use crate::math::Pose;
 pub(crate) use crate::model::grip::LoadState;
 use crate::model::grip::{Drive, Hold};
+use crate::model::joint::Motor;
 use crate::model::reel::ReelLaw;
 pub(crate) use contact::{Contact, Contacts, Site};
 use glam::{DQuat, DVec3};
@@ -61,6 +62,7 @@ pub struct State {
     pub(crate) bodies: Slots<BodyState>,
     /// By slot, force of the threads of each weld on the body that it is on \[N\].
     pub(crate) weld_force: Vec<DVec3>,
+    pub(crate) joints: Slots<JointState>,
     pub(crate) grips: Slots<GripState>,
     pub(crate) loads: Slots<LoadState>,
     pub(crate) reels: Slots<ReelState>,
@@ -135,6 +137,30 @@ impl BodyState {
     }
 }
 
+/// A joint. Forces are those of the last solve on its second side, along the axes of its first frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct JointState {
+    /// Angle \[rad\] or way \[m\] along its axis.
+    pub coordinate: f64,
+    /// What holds it \[N\], \[N m\], about the origin of its second frame.
+    pub force: DVec3,
+    pub torque: DVec3,
+    pub motor: Option<Motor>,
+    /// Along its axis: of the motor, of friction, and of a limit.
+    pub drive: [f64; 2],
+    pub stop: f64,
+    /// Whether motor and friction are at their bounds.
+    pub yields: [bool; 2],
+}
+
+impl JointState {
+    /// What goes on as it is while this is the same: at which limit it is, which drives are at which bound.
+    pub fn phase(&self) -> (f64, [f64; 2]) {
+        let sign = |v: f64| if v == 0.0 { 0.0 } else { v.signum() };
+        (sign(self.stop), [0, 1].map(|k| if self.yields[k] { sign(self.drive[k]) } else { 0.0 }))
+    }
+}
+
 /// A grip in action.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct GripState {
@@ -177,13 +203,18 @@ pub(crate) struct ReelState {
     pub added: i32,
 }
 
+/// The body that a body moves with: the one that holds it, or itself.
+pub(crate) fn root_of(bodies: &Slots<BodyState>, body: u32) -> u32 {
+    match bodies.at(body).map(|b| b.motion) {
+        Some(Moved::Held { by, .. }) => by,
+        _ => body,
+    }
+}
+
 impl State {
     /// The body that a body moves with: the one that holds it, or itself.
     pub(crate) fn root_of(&self, body: u32) -> u32 {
-        match self.bodies.at(body).map(|b| b.motion) {
-            Some(Moved::Held { by, .. }) => by,
-            _ => body,
-        }
+        root_of(&self.bodies, body)
     }
     /// Whether contact can move a body.
     pub(crate) fn gives_way(&self, body: u32) -> bool {
@@ -220,6 +251,7 @@ impl State {
             shape_target,
             bodies,
             weld_force,
+            joints,
             grips,
             loads,
             reels,
@@ -244,6 +276,7 @@ impl State {
         self.shape_target.clone_from(shape_target);
         self.bodies.copy_from(bodies);
         self.weld_force.clone_from(weld_force);
+        self.joints.copy_from(joints);
         self.grips.copy_from(grips);
         self.loads.copy_from(loads);
         self.reels.copy_from(reels);

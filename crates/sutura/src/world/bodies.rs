@@ -59,7 +59,8 @@ impl World {
         Ok(handle)
     }
 
-    /// Removes a body and its shapes. What it held is free from then on, and threads come off it.
+    /// Removes a body and its shapes. What it held is free from then on, threads come off it, and its
+    /// joints go with it.
     pub fn remove_body(&mut self, body: Handle<Body>) -> Result<(), Error> {
         let gone = self.model.bodies.remove(body).ok_or(BODY)?;
         self.state.bodies.remove(body);
@@ -70,6 +71,7 @@ impl World {
         for slot in welds {
             self.remove_weld(self.model.welds.handle(slot))?;
         }
+        self.drop_joints_of(body.index);
         for (shape, _) in gone.shapes {
             self.model.shapes.empty(shape);
             let touches = |site: crate::state::Site| site.any_shape() == Some(shape);

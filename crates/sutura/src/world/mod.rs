@@ -3,6 +3,7 @@
 mod bodies;
 mod cuts;
 mod holds;
+mod joints;
 mod rods;
 mod saved;
 mod shapes;
@@ -46,6 +47,7 @@ pub struct Wrench {
 const ROD: Error = Error::StaleHandle { what: "rod" };
 const SHAPE: Error = Error::StaleHandle { what: "shape" };
 const BODY: Error = Error::StaleHandle { what: "body" };
+const JOINT: Error = Error::StaleHandle { what: "joint" };
 const GRIP: Error = Error::StaleHandle { what: "grip" };
 const LOAD: Error = Error::StaleHandle { what: "load" };
 const REEL: Error = Error::StaleHandle { what: "reel" };

@@ -24,7 +24,7 @@ impl World {
     /// over, tensions follow the strains, and the integrator starts anew, as if [`World::set_material`] came after it.
     /// Else what follows is the same to the bit.
     pub fn restore(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let Snapshot { materials, build, bodies, state } = crate::snapshot::read(bytes)?;
+        let Snapshot { materials, build, bodies, joints, state } = crate::snapshot::read(bytes)?;
         let refused = |reason: &str| Error::Snapshot { reason: reason.into() };
         if let Some(reason) = build.and_then(|there| Build::of(&self.model, &self.state).unlike(&there)) {
             return Err(Error::Snapshot { reason });
@@ -37,6 +37,9 @@ impl World {
         let fits = self.check_fit(&state);
         let fits =
             fits.and_then(|()| (bodies == crate::snapshot::bodies_of(&self.model)).then_some(()).ok_or_else(other));
+        let jointed = || "a joint in it joins something else, or otherwise";
+        let fits =
+            fits.and_then(|()| (joints == crate::snapshot::joints_of(&self.model)).then_some(()).ok_or_else(jointed));
         if fits.is_ok() {
             self.take_up(&state);
             if materials.is_some_and(|m| m != crate::snapshot::made_of(&self.model)) {
@@ -62,6 +65,7 @@ impl World {
     fn take_up(&mut self, state: &State) {
         self.state.copy_from(state);
         self.state.bodies = state.bodies.like(&self.model.bodies);
+        self.state.joints = state.joints.like(&self.model.joints);
         self.model.refresh_masses(&self.state.loads);
     }
 
@@ -118,6 +122,21 @@ impl World {
         }
         if s.weld_force.len() != s.weld_orientation.len() || !s.weld_force.iter().all(|f| f.is_finite()) {
             return Err("a force at a weld is out of range");
+        }
+        if slots(&mut s.joints.iter().map(|(k, _)| k)) != slots(&mut self.model.joints.iter().map(|(k, _)| k)) {
+            return Err("it is of a world with other joints");
+        }
+        for (slot, j) in s.joints.iter() {
+            let numbers = [j.coordinate, j.drive[0], j.drive[1], j.stop];
+            let finite = j.force.is_finite() && j.torque.is_finite() && numbers.iter().all(|v| v.is_finite());
+            let drives = self.model.joints.at(slot).map_or([None; 2], |m| m.drives(j));
+            let most = |k: usize| drives[k].map_or(0.0, |d| d.most);
+            let bounded = (0..2).all(|k| j.drive[k].abs() <= most(k));
+            let has_axis = self.model.joints.at(slot).is_some_and(|m| m.kind.axis().is_some());
+            let motor = j.motor.is_none_or(|m| has_axis && m.validate().is_ok());
+            if !(finite && bounded && motor) {
+                return Err("a joint is out of range");
+            }
         }
         let on_its_body = |(slot, model): (u32, &BodyModel)| {
             let pose = s.bodies.at(slot).map(|b| Pose::new(b.position, b.orientation));

@@ -49,6 +49,7 @@ pub use math::Pose;
 pub use model::body::{Body, BodyMotion, BodySpec, ColliderSpec, MassProperties};
 pub use model::cut::Cut;
 pub use model::grip::{Drive, Grip, GripSpec, Hold, Load, LoadKind, LoadSpec, Place};
+pub use model::instrument::{Instrument, InstrumentSpec};
 pub use model::joint::{Joint, JointKind, JointSpec, Motor};
 pub use model::material::{Material, Plasticity, Shear};
 pub use model::needle::{NEEDLES, NeedleArc, NeedleCode, NeedlePoint, NeedleShape, NeedleSpec};

@@ -4,6 +4,7 @@ pub mod body;
 pub(crate) mod collider;
 pub mod cut;
 pub mod grip;
+pub mod instrument;
 pub mod joint;
 pub mod material;
 pub mod mesh;

@@ -46,6 +46,9 @@ const STALE: f64 = 1e-3;
 /// turns the rims too.
 const FIRST: f64 = 100.0;
 
+/// Radius of a disc that no friction force reaches \[N\].
+const WIDE: f64 = 1e9;
+
 /// Memory of the solver.
 #[derive(Default)]
 pub(crate) struct ActiveSet {
@@ -61,6 +64,38 @@ pub(crate) struct ActiveSet {
 }
 
 impl ActiveSet {
+    /// The same from where everything sticks. What is wedged, and would slide out of a wedge without friction, is found
+    /// from there only: friction and pressure that bear each other do not grow from nothing.
+    pub fn solve_from_stick(
+        &mut self,
+        s: &mut impl Delassus,
+        b: &[f64],
+        mu: &[f64],
+        l: &mut [f64],
+        limits: &Limits,
+    ) -> f64 {
+        let n = b.len();
+        l.fill(0.0);
+        for v in [&mut self.gradient, &mut self.target] {
+            v.clear();
+            v.resize(n, 0.0);
+        }
+        self.left = limits.work;
+        self.set.pressed.clear();
+        self.set.pressed.resize(n / 3, false);
+        self.set.friction.clear();
+        self.set.friction.resize(n / 3, Friction::None);
+        self.disc.clear();
+        self.disc.resize(n / 3, 0.0);
+        for (c, mu) in mu.iter().enumerate() {
+            self.set_disc(c, if *mu > 0.0 { WIDE } else { 0.0 }, l);
+        }
+        self.find_gradient(s, b, l);
+        self.fixed_discs(s, b, l, limits.residual, limits.steps, FIRST);
+        let spent = limits.work - self.left;
+        self.solve(s, b, mu, l, &Limits { work: limits.work - spent, ..*limits })
+    }
+
     /// Solves for `l` (three components a contact: normal, two tangential), starting from its value. `mu` is the
     /// coefficient of each contact. Returns the residual reached \[m\].
     pub fn solve(&mut self, s: &mut impl Delassus, b: &[f64], mu: &[f64], l: &mut [f64], limits: &Limits) -> f64 {

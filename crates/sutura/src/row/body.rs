@@ -37,8 +37,9 @@ pub(crate) struct BodyRow {
     sliding: bool,
     /// A length of the smaller of the two bodies.
     size: f64,
-    /// Compliance of the constraint \[m/N\].
+    /// Compliance of the constraint \[m/N\], and the most that it is.
     compliance: f64,
+    loose: f64,
     /// Slip still to be undone and friction force at the start of the substep.
     residual_slip: DVec3,
     friction_before: DVec3,
@@ -49,6 +50,9 @@ pub(crate) struct BodyRow {
 /// Compliance of a contact over that of a free body in a substep: it tells redundant contacts apart. A body lies as
 /// much of `g h^2` deep.
 const GIVE: f64 = 1e-3;
+
+/// Part of the size of the smaller body up to which a force presses bodies into each other.
+const DEEP: f64 = 1e-4;
 
 /// How far a place may be from one of the iterate before to be the same, over the size of the smaller body.
 const SAME: f64 = 0.5;
@@ -88,6 +92,7 @@ impl BodyRows {
                     sliding: c.sliding,
                     size: 0.0,
                     compliance: 0.0,
+                    loose: 0.0,
                     residual_slip: c.residual_slip,
                     friction_before: c.friction,
                     force: DVec3::from_array(axes.map(|axis| axis.dot(c.force()))),
@@ -148,6 +153,7 @@ impl BodyRows {
                     sliding: false,
                     size,
                     compliance: GIVE * motion.span * motion.span / mass,
+                    loose: GIVE * motion.span * motion.span / mass,
                     residual_slip: DVec3::ZERO,
                     friction_before: DVec3::ZERO,
                     force: DVec3::ZERO,
@@ -248,6 +254,8 @@ pub(crate) fn add_entries(
         // Here, since Newton may have gone back since they were found.
         row.measure(model, state, motion);
         row.moves = row.shapes.map(|shape| movers.moves(shape, row.middle));
+        // A firm load would press a light body deep.
+        row.compliance = row.loose.min(DEEP * row.size / row.force.x.max(f64::MIN_POSITIVE));
         let moved = row.moved(border);
         let slip = row.slip + row.residual_slip + moved - row.friction_before * row.compliance;
         let [n, t1, t2] = row.axes;

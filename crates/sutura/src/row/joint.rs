@@ -271,13 +271,16 @@ impl Joints {
             });
             let moved: f64 = sides.iter().map(|side| side.moved(0, &[], border)).sum();
             let gap = stop.gap(joint, &meeting, last.coordinate) - stop.allowed;
+            // However firmly it is pressed it is passed by less than what counts.
+            let loose = GIVE * stop.unit * stop.unit / a.scale_of(along);
+            let firm = 0.5 * PASSED * a.size / stop.force.max(f64::MIN_POSITIVE);
             entries.push(Entry {
                 source: Source::Limit(k as u32),
                 island: 0,
                 sides,
                 free: DVec3::X * (gap * stop.unit + moved),
                 mu: 0.0,
-                compliance: DVec3::splat(GIVE * stop.unit * stop.unit / a.scale_of(along)),
+                compliance: DVec3::splat(loose.min(firm)),
                 radius: PRECISE * a.size,
                 force: DVec3::X * stop.force,
             });

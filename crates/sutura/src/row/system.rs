@@ -213,6 +213,9 @@ struct Island {
     dense: Dense,
     sparse: Sparse,
     active_set: ActiveSet,
+    /// Bodies are in it.
+    bodies: bool,
+    spare: Vec<f64>,
     /// The sparse matrix is in use; what a solution may take; the least radius of the entries.
     many: bool,
     limits: Limits,
@@ -229,11 +232,19 @@ impl Island {
     fn solve(&mut self, b: &[f64], mu: &[f64], force: &mut [f64]) -> f64 {
         let (components, entries) = (self.components(), self.entries.clone());
         let (b, mu, force) = (&b[components.clone()], &mu[entries], &mut force[components]);
-        let left = if self.many {
-            self.active_set.solve(&mut self.sparse, b, mu, force, &self.limits)
-        } else {
-            self.active_set.solve(&mut self.dense, b, mu, force, &self.limits)
-        };
+        if self.many {
+            return self.active_set.solve(&mut self.sparse, b, mu, force, &self.limits) / self.smallest;
+        }
+        let mut left = self.active_set.solve(&mut self.dense, b, mu, force, &self.limits);
+        if self.bodies && left > params::CONTACT_LEFT * self.smallest {
+            self.spare.resize(force.len(), 0.0);
+            let limits = Limits { work: self.active_set.left().max(LEAST_WORK), ..self.limits };
+            let again = self.active_set.solve_from_stick(&mut self.dense, b, mu, &mut self.spare, &limits);
+            if again < left {
+                left = again;
+                force.copy_from_slice(&self.spare);
+            }
+        }
         left / self.smallest
     }
 
@@ -412,6 +423,7 @@ pub(crate) fn solve(
         let island = &mut islands[*k as usize];
         let entries = &entries[island.entries.clone()];
         let n = 3 * entries.len();
+        island.bodies = entries.iter().any(|e| matches!(e.source, Source::Body(_)));
         island.smallest = entries.iter().map(|e| e.radius).fold(f64::INFINITY, f64::min);
         island.many = rows.border.count() == 0 && pays(system, rods, entries, n);
         let most = if island.many { params::SPARSE_WORK } else { params::CONTACT_WORK.max((n * n * n) as f64 / 3.0) };

@@ -3,6 +3,7 @@
 mod bodies;
 mod cuts;
 mod holds;
+mod instruments;
 mod joints;
 mod rods;
 mod saved;

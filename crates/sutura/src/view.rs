@@ -11,7 +11,7 @@ use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::WeldModel;
 use crate::rod::energy::{Energy, energy};
-use crate::state::{BodyState, JointState, Site, State};
+use crate::state::{BodyState, JointState, Site, State, poses_of};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -315,7 +315,7 @@ impl JointView<'_> {
         self.meeting().frames[0].orientation * (held + DVec3::Z * along)
     }
     fn meeting(&self) -> Meeting {
-        self.joint.meeting(&self.state.bodies)
+        self.joint.meeting(poses_of(&self.state.bodies))
     }
 }
 

@@ -1,10 +1,9 @@
 //! Joints: what two free bodies, or a body and the world, may not do against each other.
 
 use crate::error::{Error, check};
-use crate::handle::{Handle, Slots};
+use crate::handle::Handle;
 use crate::math::{Pose, log};
 use crate::model::body::Body;
-use crate::state::BodyState;
 use core::f64::consts::{PI, TAU};
 use glam::DVec3;
 
@@ -168,20 +167,19 @@ impl JointSpec {
 }
 
 impl JointModel {
-    /// Where its sides are.
-    pub fn meeting(&self, bodies: &Slots<BodyState>) -> Meeting {
-        let body = |side: usize| self.bodies[side].and_then(|slot| bodies.at(slot));
-        let pose = |side: usize| body(side).map_or(Pose::IDENTITY, |b| Pose::new(b.position, b.orientation));
+    /// Where its sides are, by the poses of bodies.
+    pub fn meeting(&self, pose_of: impl Fn(u32) -> Option<Pose>) -> Meeting {
+        let poses = self.bodies.map(|body| body.and_then(&pose_of).unwrap_or(Pose::IDENTITY));
         Meeting {
-            frames: [0, 1].map(|side| pose(side).compose(&self.frames[side])),
-            centers: [0, 1].map(|side| body(side).map_or(DVec3::ZERO, |b| b.position)),
+            frames: [0, 1].map(|side| poses[side].compose(&self.frames[side])),
+            centers: poses.map(|pose| pose.position),
         }
     }
 
     /// Moves the second frame to where the joint allows it to be, where that is near. False where it is far; `size` is
     /// that of the smaller body.
-    pub fn align(&mut self, bodies: &Slots<BodyState>, size: f64) -> bool {
-        let meeting = self.meeting(bodies);
+    pub fn align(&mut self, pose_of: impl Fn(u32) -> Option<Pose>, size: f64) -> bool {
+        let meeting = self.meeting(pose_of);
         let off = |held: &Along| match held {
             Along::Way(_) => meeting.off(self.kind, *held).abs() / size,
             Along::Turn(_) => meeting.off(self.kind, *held).abs(),

@@ -28,7 +28,7 @@ use crate::row::border::Border;
 use crate::row::movers::{Movers, momentum};
 use crate::row::side::{Moves, Side};
 use crate::row::system::{Entry, Source};
-use crate::state::{BodyState, State};
+use crate::state::{BodyState, State, poses_of};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 
@@ -180,7 +180,7 @@ impl Joints {
         self.iterations += 1;
         for a in &self.active {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(poses_of(&state.bodies));
             for row in self.rows[a.rows.clone()].iter_mut().filter(|r| r.yields) {
                 let excess = residual(model, state, motion, joint, &meeting, row) * row.force;
                 if excess > 0.0 && self.iterations < RESTLESS {
@@ -195,7 +195,7 @@ impl Joints {
     pub fn assemble(&self, model: &Model, state: &State, motion: &Motion, base: usize, border: &mut Border) {
         for a in &self.active {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(poses_of(&state.bodies));
             let mut force = DVec3::ZERO;
             for k in a.rows.clone() {
                 let (row, m) = (&self.rows[k], base + k);
@@ -257,7 +257,7 @@ impl Joints {
             let a = &self.active[stop.joint];
             let joint = model.joints.at(a.slot).expect("listed");
             let (Some(along), Some(last)) = (joint.kind.axis(), state.joints.at(a.slot)) else { continue };
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(poses_of(&state.bodies));
             let columns = meeting.columns(along);
             let sides = [0, 1].map(|side| {
                 a.first[side].map_or(Side::Still, |first| {
@@ -285,7 +285,7 @@ impl Joints {
     pub fn converged(&self, model: &Model, state: &State, motion: &Motion, border: &Border, rate: f64) -> bool {
         let holds = |a: &Active| {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(poses_of(&state.bodies));
             let far = ROUNDING * meeting.frames[1].position.length();
             let left = |row: &Row| {
                 let off = residual(model, state, motion, joint, &meeting, row);
@@ -304,7 +304,7 @@ impl Joints {
             let a = &self.active[stop.joint];
             let joint = model.joints.at(a.slot).expect("listed");
             let before = state.joints.at(a.slot).map_or(0.0, |j| j.coordinate);
-            let gap = stop.gap(joint, &joint.meeting(&state.bodies), before);
+            let gap = stop.gap(joint, &joint.meeting(poses_of(&state.bodies)), before);
             (gap - stop.allowed) * stop.unit >= -PASSED * a.size
         };
         !self.changed && self.active.iter().all(holds) && self.stops.iter().all(keeps)
@@ -316,7 +316,7 @@ impl Joints {
         for (k, a) in self.active.iter().enumerate() {
             let joint = model.joints.at(a.slot).expect("listed");
             let Some(now) = joints.at_mut(a.slot) else { continue };
-            now.coordinate = joint.meeting(bodies).coordinate(joint.kind, now.coordinate);
+            now.coordinate = joint.meeting(poses_of(bodies)).coordinate(joint.kind, now.coordinate);
             (now.force, now.torque) = (DVec3::ZERO, DVec3::ZERO);
             for row in &self.rows[a.rows.clone()] {
                 match (row.drive, row.along) {

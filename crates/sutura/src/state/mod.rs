@@ -105,6 +105,11 @@ pub(crate) struct BodyState {
     pub torque: DVec3,
 }
 
+/// Pose of the center of mass and principal axes of each body, by its slot.
+pub(crate) fn poses_of(bodies: &Slots<BodyState>) -> impl Fn(u32) -> Option<Pose> + '_ {
+    |slot| bodies.at(slot).map(|b| Pose::new(b.position, b.orientation))
+}
+
 /// A joint. Forces are those of the last solve on its second side, along the axes of its first frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct JointState {

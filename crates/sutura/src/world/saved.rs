@@ -5,8 +5,9 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::body::BodyModel;
 use crate::model::grip::{Hold, LoadKind, Place};
+use crate::model::joint::JointModel;
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{Contact, History, Site, State};
+use crate::state::{Contact, History, Site, State, poses_of};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -122,6 +123,10 @@ impl World {
             let bounded = (0..2).all(|k| j.drive[k].abs() <= most(k));
             if !(finite && bounded) {
                 return Err("a joint is out of range");
+            }
+            let there = |m: &JointModel| m.meeting(poses_of(&s.bodies)).coordinate(m.kind, j.coordinate);
+            if !self.model.joints.at(slot).is_some_and(|m| there(m) == j.coordinate) {
+                return Err("a joint is not where its bodies are");
             }
         }
         let on_its_body = |(slot, model): (u32, &BodyModel)| {

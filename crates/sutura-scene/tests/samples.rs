@@ -45,6 +45,8 @@ sample_tests!(
     capstan,
     cut,
     rolling,
+    hanging_needle,
+    hand_over,
     pendulum,
     heap
 );

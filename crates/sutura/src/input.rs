@@ -12,6 +12,7 @@ use crate::math::Pose;
 use crate::model::body::{Body, BodyMotion, BodySpec, ColliderSpec};
 use crate::model::cut::Cut;
 use crate::model::grip::{Drive, Grip, GripSpec, Load, LoadKind, LoadSpec, Place};
+use crate::model::instrument::{Instrument, InstrumentSpec};
 use crate::model::joint::{Joint, JointKind, JointModel, JointSpec, Motor};
 use crate::model::material::{Material, Plasticity, Shear};
 use crate::model::reel::{Reel, ReelLaw, ReelSpec};
@@ -234,6 +235,16 @@ impl Recorder {
         set_step_work(most: Option<f64>) -> (), Input::StepWork(most);
         /// [`World::restore`].
         restore(bytes: &[u8]) -> (), Input::Restore(bytes.to_vec());
+    }
+
+    /// [`World::insert_instrument`], recorded as the bodies and the joint that it is.
+    pub fn insert_instrument(&mut self, spec: &InstrumentSpec) -> Result<Instrument, Error> {
+        let drive = |recorder: &mut Recorder, handle| recorder.set_body_motion(handle, BodyMotion::Driven);
+        spec.insert(self, Recorder::insert_body, drive, Recorder::insert_joint)
+    }
+    /// [`World::close_jaws`].
+    pub fn close_jaws(&mut self, instrument: &Instrument, spec: &InstrumentSpec, close: bool) -> Result<(), Error> {
+        self.set_joint_motor(instrument.hinge, Some(spec.motor(close)))
     }
 
     /// [`World::step`].

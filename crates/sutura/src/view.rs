@@ -12,7 +12,7 @@ use crate::model::section::{Profile, Section};
 use crate::model::shape::{Geometry, ShapeMotion};
 use crate::model::weld::{WeldModel, rest_across};
 use crate::rod::energy::{Energy, energy};
-use crate::state::{BodyState, JointState, Moved, Site, State};
+use crate::state::{BodyState, JointState, Moved, Site, State, places_of};
 use glam::{DQuat, DVec3};
 
 /// All that can be read at one accepted state.
@@ -360,7 +360,7 @@ impl JointView<'_> {
         self.meeting().frames[0].orientation * (held + DVec3::Z * along)
     }
     fn meeting(&self) -> Meeting {
-        self.joint.meeting(&self.state.bodies)
+        self.joint.meeting(places_of(&self.state.bodies))
     }
 }
 

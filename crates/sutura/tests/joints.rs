@@ -597,3 +597,24 @@ fn joined_bodies_touch_where_they_are_to() {
         }
     }
 }
+
+/// A motor that lifts bears the weight at its speed; one too weak falls with what is left of gravity.
+#[test]
+fn a_motor_lifts_what_it_can() {
+    for (part, lifts) in [(1.5, true), (0.75, false)] {
+        let mut world = World::new(settings()).unwrap();
+        let body = world.insert_body(&bar(DVec3::splat(0.02), Pose::IDENTITY)).unwrap();
+        let weight = G * world.body(body).unwrap().mass().mass;
+        let spec = join(&world, JointKind::Slider, [None, Some(body)], Pose::IDENTITY);
+        let motor = Some(Motor { speed: 0.1, most: part * weight });
+        let joint = world.insert_joint(&JointSpec { motor, ..spec }).unwrap();
+        run(&mut world, 0.5, DT, |world, _| {
+            assert!(world.joint(joint).unwrap().motor_force() <= part * weight);
+        });
+        let view = world.joint(joint).unwrap();
+        let (rate, force) = if lifts { (0.1, weight) } else { (-0.25 * G * 0.5, 0.75 * weight) };
+        assert!((view.rate() / rate - 1.0).abs() < 1e-6, "{} {rate}", view.rate());
+        assert!((view.motor_force() / force - 1.0).abs() < 1e-6, "{} {force}", view.motor_force());
+        assert!((view.force().z / force - 1.0).abs() < 1e-6);
+    }
+}

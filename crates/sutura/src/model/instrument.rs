@@ -1,4 +1,4 @@
-//! Instruments: a handle that is led, and two jaws that close on what is between them.
+//! Instruments: a handle that is led, with a jaw that is part of it, and a second jaw that closes on what is between.
 
 use crate::error::{Error, check};
 use crate::handle::Handle;
@@ -8,19 +8,19 @@ use crate::model::joint::{Joint, JointKind, JointSpec, Motor};
 use crate::model::shape::Geometry;
 use glam::{DQuat, DVec3};
 
-/// An instrument with two jaws. Its frame has the hinge as origin, the jaws along z, and y along the hinge; closed, the
-/// jaws meet in the plane x = 0.
+/// An instrument with two jaws, one of them fixed, as many needle drivers have. Its frame has the hinge as origin, the
+/// jaws along z, and y along the hinge; closed, they meet in the plane x = 0, the fixed one on the side of -x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InstrumentSpec {
     /// Where it is at first.
     pub pose: Pose,
     /// Length of the jaws from the hinge, their width along the hinge, and their thickness at the hinge \[m\].
     pub jaw: DVec3,
-    /// Angle of each jaw from the middle when they are open, and at first \[rad\].
+    /// Angle between the jaws when they are open, and at first \[rad\].
     pub opening: f64,
     /// Force at the middle of a jaw with which they close \[N\].
     pub closing_force: f64,
-    /// Speed at which each jaw turns where nothing resists \[rad/s\].
+    /// Speed at which the jaw turns where nothing resists \[rad/s\].
     pub speed: f64,
     /// Length and radius of the shaft behind the hinge \[m\].
     pub shaft: [f64; 2],
@@ -33,15 +33,15 @@ pub struct InstrumentSpec {
 /// What the angle of a jaw may be off its limits for rounding when it is put in \[rad\].
 const ROUNDING: f64 = 1e-6;
 
-/// An instrument in a world: its handle, its jaws and their hinges.
+/// An instrument in a world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
-    /// Driven: [`World::set_body_pose`](crate::World::set_body_pose) leads it.
+    /// Its handle with the fixed jaw, driven: [`World::set_body_pose`](crate::World::set_body_pose) leads it.
     pub handle: Handle<Body>,
-    /// The jaws, that on the side of +x first.
-    pub jaws: [Handle<Body>; 2],
-    /// Their hinges; the angle of each grows as it opens.
-    pub hinges: [Handle<Joint>; 2],
+    /// The jaw that moves.
+    pub jaw: Handle<Body>,
+    /// Its hinge, whose angle grows as it opens.
+    pub hinge: Handle<Joint>,
 }
 
 impl InstrumentSpec {
@@ -73,22 +73,20 @@ impl InstrumentSpec {
         drive: impl Fn(&mut W, Handle<Body>) -> Result<(), Error>,
         joint: impl Fn(&mut W, &JointSpec) -> Result<Handle<Joint>, Error>,
     ) -> Result<Instrument, Error> {
-        let [handle, first, second] = self.bodies()?;
-        let handle = body(world, &handle)?;
-        let jaws = [body(world, &first)?, body(world, &second)?];
+        let [handle, jaw] = self.bodies()?;
+        let (handle, jaw) = (body(world, &handle)?, body(world, &jaw)?);
         drive(world, handle)?;
-        let [a, b] = self.hinges(handle, jaws);
-        Ok(Instrument { handle, jaws, hinges: [joint(world, &a)?, joint(world, &b)?] })
+        Ok(Instrument { handle, jaw, hinge: joint(world, &self.hinge(handle, jaw))? })
     }
 
-    /// What the motor of a jaw does while they close, or open.
+    /// What the motor of the jaw does while it closes, or opens.
     pub fn motor(&self, close: bool) -> Motor {
         let speed = if close { -self.speed } else { self.speed };
         Motor { speed, most: self.closing_force * 0.5 * self.jaw.x }
     }
 
-    /// Handle and jaws, the latter as open as they are at first.
-    fn bodies(&self) -> Result<[BodySpec; 3], Error> {
+    /// Handle and jaw, the latter as open as it is at first.
+    fn bodies(&self) -> Result<[BodySpec; 2], Error> {
         let what = "instrument";
         let positive = |field, v: f64| check(what, field, v, v > 0.0, "a finite number > 0");
         self.jaw.to_array().into_iter().try_for_each(|v| positive("jaw", v))?;
@@ -106,28 +104,23 @@ impl InstrumentSpec {
             density: self.density,
             surface: self.surface,
         };
-        let body =
-            |pose, part| BodySpec { pose, colliders: vec![part], velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO };
+        let body = |pose, colliders| BodySpec { pose, colliders, velocity: DVec3::ZERO, angular_velocity: DVec3::ZERO };
         let [length, radius] = self.shaft;
         let shaft = Geometry::Cylinder { radius, half_length: 0.5 * length };
-        let handle = body(self.pose, solid(shaft, DVec3::NEG_Z * (0.5 * length + self.jaw.z)));
+        let shaft = solid(shaft, DVec3::NEG_Z * (0.5 * length + self.jaw.z));
         let jaw = |side: f64| {
             let half_sides = DVec3::new(self.jaw.z, self.jaw.y, self.jaw.x) * 0.5;
-            let at = DVec3::new(side * half_sides.x, 0.0, half_sides.z);
-            let turned = Pose::new(DVec3::ZERO, DQuat::from_rotation_y(side * self.opening));
-            body(self.pose.compose(&turned), solid(Geometry::Box { half_sides }, at))
+            solid(Geometry::Box { half_sides }, DVec3::new(side * half_sides.x, 0.0, half_sides.z))
         };
-        Ok([handle, jaw(1.0), jaw(-1.0)])
+        let open = Pose::new(DVec3::ZERO, DQuat::from_rotation_y(self.opening));
+        Ok([body(self.pose, vec![shaft, jaw(-1.0)]), body(self.pose.compose(&open), vec![jaw(1.0)])])
     }
 
-    /// The hinges, of bodies as [`bodies`](Self::bodies) gives them: zero is closed.
-    fn hinges(&self, handle: Handle<Body>, jaws: [Handle<Body>; 2]) -> [JointSpec; 2] {
-        [0, 1].map(|k| {
-            // The axis of a joint is its z: along y for the one jaw, against it for the other, so that both open alike.
-            let side = if k == 0 { 1.0 } else { -1.0 };
-            let axis = Pose::new(DVec3::ZERO, DQuat::from_rotation_arc(DVec3::Z, DVec3::Y * side));
-            let spec = JointSpec::new(JointKind::Hinge, [Some(handle), Some(jaws[k])], [axis; 2]);
-            JointSpec { limits: Some([-ROUNDING, self.opening + ROUNDING]), motor: Some(self.motor(false)), ..spec }
-        })
+    /// The hinge of bodies as [`bodies`](Self::bodies) gives them: zero is closed.
+    fn hinge(&self, handle: Handle<Body>, jaw: Handle<Body>) -> JointSpec {
+        // The axis of a joint is its z. The jaw is open now, and the frames meet but for its turn.
+        let axis = Pose::new(DVec3::ZERO, DQuat::from_rotation_arc(DVec3::Z, DVec3::Y));
+        let spec = JointSpec::new(JointKind::Hinge, [Some(handle), Some(jaw)], [axis; 2]);
+        JointSpec { limits: Some([-ROUNDING, self.opening + ROUNDING]), motor: Some(self.motor(false)), ..spec }
     }
 }

@@ -1,10 +1,9 @@
 //! Joints: what two free bodies, or a body and the world, may not do against each other.
 
 use crate::error::{Error, check};
-use crate::handle::{Handle, Slots};
+use crate::handle::Handle;
 use crate::math::{Pose, log};
 use crate::model::body::Body;
-use crate::state::{BodyState, JointState, root_of};
 use core::f64::consts::{PI, TAU};
 use glam::DVec3;
 
@@ -171,31 +170,19 @@ impl Motor {
 }
 
 impl JointModel {
-    /// Where its sides are.
-    pub fn meeting(&self, bodies: &Slots<BodyState>) -> Meeting {
-        let body = |slot: Option<u32>| slot.and_then(|slot| bodies.at(slot));
-        let pose = |slot: Option<u32>| body(slot).map_or(Pose::IDENTITY, BodyState::pose);
-        let roots = self.roots(bodies);
+    /// Where its sides are, by the poses of bodies and the centers of mass of what moves these.
+    pub fn meeting(&self, place_of: impl Fn(u32) -> Option<(Pose, DVec3)>) -> Meeting {
+        let places = self.bodies.map(|body| body.and_then(&place_of).unwrap_or((Pose::IDENTITY, DVec3::ZERO)));
         Meeting {
-            frames: [0, 1].map(|side| pose(self.bodies[side]).compose(&self.frames[side])),
-            centers: roots.map(|slot| body(slot).map_or(DVec3::ZERO, |b| b.position)),
+            frames: [0, 1].map(|side| places[side].0.compose(&self.frames[side])),
+            centers: places.map(|(_, center)| center),
         }
-    }
-
-    /// The bodies with which its sides move: those that hold its own, or these.
-    pub fn roots(&self, bodies: &Slots<BodyState>) -> [Option<u32>; 2] {
-        self.bodies.map(|slot| slot.map(|slot| root_of(bodies, slot)))
-    }
-
-    /// What keeps a speed: the motor, and friction.
-    pub fn drives(&self, state: &JointState) -> [Option<Motor>; 2] {
-        [state.motor, self.friction]
     }
 
     /// Moves the second frame to where the joint allows it to be, where that is near. False where it is far; `size` is
     /// that of the smaller body.
-    pub fn align(&mut self, bodies: &Slots<BodyState>, size: f64) -> bool {
-        let meeting = self.meeting(bodies);
+    pub fn align(&mut self, place_of: impl Fn(u32) -> Option<(Pose, DVec3)>, size: f64) -> bool {
+        let meeting = self.meeting(place_of);
         let off = |held: &Along| match held {
             Along::Way(_) => meeting.off(self.kind, *held).abs() / size,
             Along::Turn(_) => meeting.off(self.kind, *held).abs(),

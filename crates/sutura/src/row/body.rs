@@ -52,7 +52,7 @@ pub(crate) struct BodyRow {
 const GIVE: f64 = 1e-3;
 
 /// Part of the size of the smaller body up to which a force presses bodies into each other.
-const DEEP: f64 = 1e-4;
+const DEEP: f64 = 2e-3;
 
 /// How far a place may be from one of the iterate before to be the same, over the size of the smaller body.
 const SAME: f64 = 0.5;

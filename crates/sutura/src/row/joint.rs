@@ -28,7 +28,7 @@ use crate::row::border::Border;
 use crate::row::movers::{Movers, momentum};
 use crate::row::side::{Moves, Side};
 use crate::row::system::{Entry, Source};
-use crate::state::{BodyState, State};
+use crate::state::{BodyState, State, places_of, root_of};
 use core::ops::Range;
 use glam::{DMat3, DVec3};
 
@@ -154,7 +154,7 @@ impl Joints {
                 rows.push(Row { along: *along, drive: None, force, yields: false });
             }
             if let Some(along) = joint.kind.axis() {
-                let drives = joint.drives(last).into_iter().enumerate();
+                let drives = last.drives(joint).into_iter().enumerate();
                 for (k, motor) in drives.filter_map(|(k, motor)| Some((k, motor?))) {
                     let force = last.drive[k].clamp(-motor.most, motor.most);
                     rows.push(Row { along, drive: Some((k, motor)), force, yields: last.yields[k] });
@@ -184,7 +184,7 @@ impl Joints {
         self.iterations += 1;
         for a in &self.active {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(places_of(&state.bodies));
             for row in self.rows[a.rows.clone()].iter_mut().filter(|r| r.yields) {
                 let excess = residual(model, state, motion, joint, &meeting, row) * row.force;
                 if excess > 0.0 && self.iterations < RESTLESS {
@@ -199,7 +199,7 @@ impl Joints {
     pub fn assemble(&self, model: &Model, state: &State, motion: &Motion, base: usize, border: &mut Border) {
         for a in &self.active {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(places_of(&state.bodies));
             let mut force = DVec3::ZERO;
             for k in a.rows.clone() {
                 let (row, m) = (&self.rows[k], base + k);
@@ -261,7 +261,7 @@ impl Joints {
             let a = &self.active[stop.joint];
             let joint = model.joints.at(a.slot).expect("listed");
             let (Some(along), Some(last)) = (joint.kind.axis(), state.joints.at(a.slot)) else { continue };
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(places_of(&state.bodies));
             let columns = meeting.columns(along);
             let sides = [0, 1].map(|side| {
                 a.first[side].map_or(Side::Still, |first| {
@@ -292,7 +292,7 @@ impl Joints {
     pub fn converged(&self, model: &Model, state: &State, motion: &Motion, border: &Border, rate: f64) -> bool {
         let holds = |a: &Active| {
             let joint = model.joints.at(a.slot).expect("listed");
-            let meeting = joint.meeting(&state.bodies);
+            let meeting = joint.meeting(places_of(&state.bodies));
             let far = ROUNDING * meeting.frames[1].position.length();
             let left = |row: &Row| {
                 let off = residual(model, state, motion, joint, &meeting, row);
@@ -311,7 +311,7 @@ impl Joints {
             let a = &self.active[stop.joint];
             let joint = model.joints.at(a.slot).expect("listed");
             let before = state.joints.at(a.slot).map_or(0.0, |j| j.coordinate);
-            let gap = stop.gap(joint, &joint.meeting(&state.bodies), before);
+            let gap = stop.gap(joint, &joint.meeting(places_of(&state.bodies)), before);
             (gap - stop.allowed) * stop.unit >= -PASSED * a.size
         };
         !self.changed && self.active.iter().all(holds) && self.stops.iter().all(keeps)
@@ -320,10 +320,13 @@ impl Joints {
     /// Leaves coordinates and forces in the state.
     pub fn store(&self, model: &Model, state: &mut State) {
         let State { joints, bodies, .. } = state;
+        // Those of bodies that are led as well.
+        for (slot, joint) in model.joints.iter() {
+            let Some(now) = joints.at_mut(slot) else { continue };
+            now.coordinate = joint.meeting(places_of(bodies)).coordinate(joint.kind, now.coordinate);
+        }
         for (k, a) in self.active.iter().enumerate() {
-            let joint = model.joints.at(a.slot).expect("listed");
             let Some(now) = joints.at_mut(a.slot) else { continue };
-            now.coordinate = joint.meeting(bodies).coordinate(joint.kind, now.coordinate);
             (now.force, now.torque) = (DVec3::ZERO, DVec3::ZERO);
             for row in &self.rows[a.rows.clone()] {
                 match (row.drive, row.along) {
@@ -366,9 +369,8 @@ fn residual(model: &Model, state: &State, motion: &Motion, joint: &JointModel, m
     let Some((_, motor)) = row.drive else {
         return meeting.off(joint.kind, row.along) + compliance(joint, row) * row.force;
     };
-    let rates = joint
-        .roots(&state.bodies)
-        .map(|b| b.map_or([DVec3::ZERO; 2], |slot| rates(model, &state.bodies, motion, slot)));
+    let rates_of = |slot: u32| rates(model, &state.bodies, motion, root_of(&state.bodies, slot));
+    let rates = joint.bodies.map(|b| b.map_or([DVec3::ZERO; 2], rates_of));
     (meeting.rate(row.along, rates) - motor.speed) * motion.span
 }
 

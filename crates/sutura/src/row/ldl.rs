@@ -186,7 +186,7 @@ mod tests {
                 }
             } else if low < moving {
                 let joint = (high - moving) / 3;
-                if low / 6 == joint || low / 6 == joint + 1 { ((low * 7 + high * 3) as f64).sin() } else { 0.0 }
+                if low / 6 == joint || low / 6 == joint + 1 { ((low * high) as f64).sin() } else { 0.0 }
             } else if i == j {
                 -1e-10
             } else {

@@ -7,7 +7,7 @@ use crate::handle::Slots;
 use crate::math::Pose;
 pub(crate) use crate::model::grip::LoadState;
 use crate::model::grip::{Drive, Hold};
-use crate::model::joint::Motor;
+use crate::model::joint::{JointModel, Motor};
 use crate::model::reel::ReelLaw;
 pub(crate) use contact::{Contact, Contacts, Site};
 use glam::{DQuat, DVec3};
@@ -137,6 +137,11 @@ impl BodyState {
     }
 }
 
+/// Pose of the center of mass and principal axes of each body, by its slot, and the center of mass of what moves it.
+pub(crate) fn places_of(bodies: &Slots<BodyState>) -> impl Fn(u32) -> Option<(Pose, DVec3)> + '_ {
+    |slot| Some((bodies.at(slot)?.pose(), bodies.at(root_of(bodies, slot))?.position))
+}
+
 /// A joint. Forces are those of the last solve on its second side, along the axes of its first frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct JointState {
@@ -154,6 +159,10 @@ pub(crate) struct JointState {
 }
 
 impl JointState {
+    /// What keeps a speed: the motor, and friction.
+    pub fn drives(&self, joint: &JointModel) -> [Option<Motor>; 2] {
+        [self.motor, joint.friction]
+    }
     /// What goes on as it is while this is the same: at which limit it is, which drives are at which bound.
     pub fn phase(&self) -> (f64, [f64; 2]) {
         let sign = |v: f64| if v == 0.0 { 0.0 } else { v.signum() };

@@ -6,7 +6,7 @@ use crate::handle::Handle;
 use crate::math::Pose;
 use crate::model::body::{Body, BodyModel};
 use crate::model::joint::{Joint, JointModel, JointSpec, Motor};
-use crate::state::{History, JointState};
+use crate::state::{History, JointState, places_of};
 use crate::view::JointView;
 
 impl World {
@@ -34,11 +34,11 @@ impl World {
             friction: Some(friction).filter(|f| f.most > 0.0),
             touch: spec.touch,
         };
-        if !joint.align(&self.state.bodies, size) {
-            let [first, second] = joint.meeting(&self.state.bodies).frames;
+        if !joint.align(places_of(&self.state.bodies), size) {
+            let [first, second] = joint.meeting(places_of(&self.state.bodies)).frames;
             return Err(Error::invalid("joint", "frames", [first, second], "frames that meet where the bodies are"));
         }
-        let coordinate = joint.meeting(&self.state.bodies).coordinate(spec.kind, 0.0);
+        let coordinate = joint.meeting(places_of(&self.state.bodies)).coordinate(spec.kind, 0.0);
         if let Some([least, most]) = spec.limits
             && !(least..=most).contains(&coordinate)
         {

@@ -5,8 +5,9 @@ use crate::error::Error;
 use crate::math::Pose;
 use crate::model::body::BodyModel;
 use crate::model::grip::{Hold, LoadKind, Place};
+use crate::model::joint::JointModel;
 use crate::snapshot::{Build, Snapshot};
-use crate::state::{Contact, History, Moved, Site, State};
+use crate::state::{Contact, History, Moved, Site, State, places_of};
 
 impl World {
     /// Everything that the next step depends on beyond the model, as bytes (little endian, versioned).
@@ -129,13 +130,17 @@ impl World {
         for (slot, j) in s.joints.iter() {
             let numbers = [j.coordinate, j.drive[0], j.drive[1], j.stop];
             let finite = j.force.is_finite() && j.torque.is_finite() && numbers.iter().all(|v| v.is_finite());
-            let drives = self.model.joints.at(slot).map_or([None; 2], |m| m.drives(j));
+            let drives = self.model.joints.at(slot).map_or([None; 2], |m| j.drives(m));
             let most = |k: usize| drives[k].map_or(0.0, |d| d.most);
             let bounded = (0..2).all(|k| j.drive[k].abs() <= most(k));
             let has_axis = self.model.joints.at(slot).is_some_and(|m| m.kind.axis().is_some());
             let motor = j.motor.is_none_or(|m| has_axis && m.validate().is_ok());
             if !(finite && bounded && motor) {
                 return Err("a joint is out of range");
+            }
+            let there = |m: &JointModel| m.meeting(places_of(&s.bodies)).coordinate(m.kind, j.coordinate);
+            if !self.model.joints.at(slot).is_some_and(|m| there(m) == j.coordinate) {
+                return Err("a joint is not where its bodies are");
             }
         }
         let on_its_body = |(slot, model): (u32, &BodyModel)| {

@@ -142,17 +142,14 @@ impl<'d> Loader<'d> {
             (None, None) => table.need(key, wanted),
             (value, _) => value,
         };
-        let shape = given("shape", wanted).map(|v| v.choice(&SHAPES)).unwrap_or(code.map(|c| c.shape));
-        let length = given("length", "the length of the arc, or a `code`")
-            .map(|v| positive_value(&v, Dim::LENGTH))
-            .unwrap_or(code.map(|c| c.length));
-        let wire = given("wire", "the diameter of the wire, or a `code`")
-            .map(|v| positive_value(&v, Dim::LENGTH))
-            .unwrap_or(code.map(|c| c.wire));
-        let point =
-            table.get("point").map(|v| v.choice(&POINTS)).unwrap_or(Some(code.map_or(NeedlePoint::Taper, |c| c.point)));
+        let shape = given("shape", wanted).map_or(code.map(|c| c.shape), |v| v.choice(&SHAPES));
+        let length = |v: Value<'d>| positive_value(&v, Dim::LENGTH);
+        let arc = given("length", "the length of the arc, or a `code`").map_or(code.map(|c| c.length), length);
+        let wire = given("wire", "the diameter of the wire, or a `code`").map_or(code.map(|c| c.wire), length);
+        let point = Some(code.map_or(NeedlePoint::Taper, |c| c.point));
+        let point = table.get("point").map_or(point, |v| v.choice(&POINTS));
         let density = positive(table, "density", Dim::DENSITY);
-        let spec = NeedleSpec::new(shape?, length?, wire?, point?);
+        let spec = NeedleSpec::new(shape?, arc?, wire?, point?);
         Some(NeedleSpec { density: density.unwrap_or(spec.density), surface, ..spec })
     }
 

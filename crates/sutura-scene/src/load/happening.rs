@@ -80,7 +80,7 @@ impl<'d> Loader<'d> {
 
     pub(super) fn action(&mut self, table: &Table<'d>) -> Option<Step> {
         const VERBS: [&str; 16] = [
-            "take", "let_go", "move", "rest", "push", "hold", "release", "load", "unload", "cut", "mark", "gravity",
+            "take", "let_go", "move", "rest", "push", "grasp", "release", "load", "unload", "cut", "mark", "gravity",
             "solver", "friction", "material", "reel",
         ];
         let found: Vec<(&str, Value<'d>)> =
@@ -103,7 +103,7 @@ impl<'d> Loader<'d> {
                 }
                 self.push(table, what)
             }),
-            "hold" => {
+            "grasp" => {
                 let by = table.need("by", "the body that holds it").and_then(|v| self.find_body(&v));
                 self.find_body(value).zip(by).map(|(body, by)| Action::Hold { body, by })
             }

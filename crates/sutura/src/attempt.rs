@@ -3,7 +3,7 @@
 use crate::budget::{self, Settled};
 use crate::collide::{self, Clearance};
 use crate::drive::{Begun, Interval, predict};
-use crate::finite::all_finite;
+use crate::finite::{all_finite, in_proportion};
 use crate::integrator::{self, Method, Stage, touches_anew};
 use crate::model::Model;
 use crate::newton::{self, Outcome, Solver};
@@ -105,6 +105,10 @@ pub(crate) fn attempt(step: &mut Step<'_, '_>, sub: Substep, method: Method) -> 
                 Settled::Coarse => so_far.too_coarse = true,
                 Settled::Gained if !last => so_far.verdict = Err(Rejection::EnergyGained.into()),
                 Settled::Gained => {}
+            }
+            // What was corrected of velocities may be out of all proportion.
+            if so_far.verdict.is_ok() && !in_proportion(model, state) {
+                so_far.verdict = Err(Rejection::NotFinite.into());
             }
             return so_far;
         }

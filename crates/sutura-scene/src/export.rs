@@ -175,7 +175,7 @@ trait Writer {
     fn finish(self: Box<Self>, seen: &Seen<'_>, out: &mut Output) -> Result<(), ExportError>;
 }
 
-/// What there is to write, so far.
+/// The threads and shapes that there are to write so far.
 struct Seen<'a> {
     header: &'a Header,
     looks: &'a Looks,
@@ -187,7 +187,7 @@ struct Output {
     bytes: u64,
 }
 
-/// What the threads and shapes of a recording look like: of the threads those that have come.
+/// The looks of the shapes of a recording, and of those of its threads that have come.
 #[derive(Default)]
 struct Looks {
     skins: Vec<Skin>,

@@ -87,7 +87,7 @@ struct Loader<'d> {
     /// Those of the scene, then the parts that cuts make, as the actions are read.
     threads: Vec<ThreadDef>,
     own_threads: usize,
-    /// Of each thread, at the action that is read: rest lengths of its elements \[m\], and whether it is closed.
+    /// The rest lengths of the elements of each thread \[m\] at the action that is read, and whether it is closed.
     extents: Vec<(Vec<f64>, bool)>,
     shapes: Vec<ShapeDef>,
     bodies: Vec<BodyDef>,

@@ -1,4 +1,4 @@
-//! What becomes of the places of a thread that is cut.
+//! Cuts as scenes see them: each maps the places of a thread onto its two parts.
 
 use sutura::Place;
 
@@ -7,7 +7,7 @@ use sutura::Place;
 pub struct Parting {
     /// Rest lengths of its elements \[m\].
     pub lengths: Vec<f64>,
-    /// Whether its end is joined to its start.
+    /// The thread is closed: its end is joined to its start.
     pub closed: bool,
     /// The particle at which it is cut.
     pub particle: usize,
@@ -40,7 +40,7 @@ impl Parting {
         if self.closed { ([after, before].concat(), None) } else { (before.to_vec(), Some(after.to_vec())) }
     }
 
-    /// Whether a place goes with the rest, and where it is then.
+    /// Says whether a place goes with the rest, and where it is then.
     pub fn carry(&self, place: Place) -> (bool, Place) {
         let (n, k) = (self.lengths.len() as u32, self.particle as u32);
         let arc: f64 = self.lengths[..self.particle].iter().sum();

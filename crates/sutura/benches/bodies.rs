@@ -1,5 +1,5 @@
-//! Cost of free bodies at rest and in a heap: `cargo bench -p sutura --bench bodies [-- COUNT ...]`. Milliseconds of CPU
-//! time a frame: median and worst, of boxes apart from each other on a floor and of solids dropped into a box.
+//! Cost of free bodies at rest and in a heap: `cargo bench -p sutura --bench bodies [-- COUNT ...]`. Milliseconds of
+//! CPU time a frame: median and worst, of boxes apart from each other on a floor and of solids dropped into a box.
 
 use cpu_time::ThreadTime;
 use sutura::glam::{DQuat, DVec3};

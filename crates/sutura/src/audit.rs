@@ -15,8 +15,8 @@
 //!   overlaps; to a shape (distance of centerline from surface - radius) / diameter. Only what is nearer than one
 //!   diameter is looked at.
 //!
-//! A thread or shape that appears, or whose number of particles changes, or that is a ring which was cut, is taken up from
-//! its first state on; a thread
+//! A thread or shape that appears, or whose number of particles changes, or that is a ring which was cut, is taken up
+//! from its first state on; a thread
 //! removed and replaced by one of the same size and radius in the same slot between two states cannot be told from a
 //! move.
 
@@ -133,8 +133,8 @@ struct SeenShape {
     alive: bool,
 }
 
-/// Places that are joined at the state at hand, or were until a cut: the number of the thread there and the rest arc on it, and up to which
-/// way by there elements of the threads do not touch.
+/// Places that are joined at the state at hand, or were until a cut: the number of the thread there and the rest arc on
+/// it, and up to which way by there elements of the threads do not touch.
 #[derive(Debug)]
 struct SeenWeld {
     places: Vec<(usize, f64)>,

@@ -43,8 +43,8 @@ pub(crate) struct BodyStart {
     pub kept: DVec3,
     /// Orientation and angular momentum that the solve sets out with.
     pub base: DQuat,
-    /// Part of the turn from there at which the inertia is taken: what the mean velocity of a solve asks for, or the one
-    /// at its end.
+    /// Part of the turn from there at which the inertia is taken: what the mean velocity of a solve asks for, or the
+    /// one at its end.
     pub part: f64,
     pub momentum: DVec3,
 }

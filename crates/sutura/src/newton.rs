@@ -88,8 +88,8 @@ pub(crate) fn solve(model: &Model, state: &mut State, solver: &mut Solver, h: f6
     let hangs = |w: &WeldModel| w.anchor.is_some_and(|a| state.gives_way(a.body));
     let hanging = model.welds.iter().any(|(_, weld)| hangs(weld));
     let stiff = |w: &WeldModel| w.members.iter().any(|m| firm(m.rod));
-    // What hangs and turns by little more than nothing has second thoughts too: a stiff thread is stretched by that with
-    // more than the weight of a needle.
+    // What hangs and turns by little more than nothing has second thoughts too: a stiff thread is stretched by that
+    // with more than the weight of a needle.
     let least = if hanging || model.welds.iter().any(|(_, weld)| stiff(weld)) { 2 } else { 1 };
     let (mut before, mut moved_before) = (f64::INFINITY, f64::INFINITY);
     // Work of the forces along the last step, over its full length, and the part of it that was taken.

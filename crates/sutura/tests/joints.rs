@@ -268,8 +268,8 @@ fn friction_of_a_joint_holds_and_brakes() {
     assert!((turned / (0.25 * rate * 0.01) - 1.0).abs() < 0.02 && (force + 0.5).abs() < 1e-12);
 }
 
-/// Five light bars and a ball of ten thousand times the mass of each: a string of no mass and a ball, whose slow mode is
-/// known.
+/// Five light bars and a ball of ten thousand times the mass of each: a string of no mass and a ball, whose slow mode
+/// is known.
 #[test]
 fn light_links_carry_a_heavy_end() {
     let mut world = World::new(settings()).unwrap();

@@ -26,7 +26,7 @@ use sutura::skin::{Bone, TriangleMesh};
 pub struct Glb {
     up: DVec3,
     times: Vec<f64>,
-    /// Of each bone of each thread, and of each shape.
+    /// One per bone of each thread, then one per shape.
     bones: Vec<Vec<Path>>,
     shapes: Vec<Path>,
 }
@@ -52,7 +52,7 @@ impl Path {
         self.turns.push(if against { turn.map(|v| -v) } else { turn });
     }
 
-    /// That of a bone which comes after so many moments: until then it is there without size.
+    /// Returns the path of a bone that comes after so many moments: until then the bone has no size.
     fn unseen(bone: &Bone, moments: usize) -> Self {
         let mut path = Path::default();
         for _ in 0..moments {

@@ -4,8 +4,8 @@
 //! Contact parts what is pressed into each other as long as the centerlines say where to. Where a centerline runs
 //! within another thread, in a solid or across a mesh, what comes of it is a knot that nobody tied, or none.
 //!
-//! Left out is what contact leaves out (neighbors along a thread, through a weld and at a cut), and what is pressed in by less
-//! than `PRESSED`.
+//! Left out is what contact leaves out (neighbors along a thread, through a weld and at a cut), and what is pressed in
+//! by less than `PRESSED`.
 
 use super::tree::{Bounds, Tree};
 use super::{arcs, attached, neighbors, turning};

@@ -178,8 +178,8 @@ impl NeedleSpec {
         Pose::new(swage, DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize())
     }
 
-    /// The body that it is, with its frame there: capsules along its curve, thinner toward the point, of the mass of the
-    /// wire.
+    /// The body that it is, with its frame there: capsules along its curve, thinner toward the point, of the mass of
+    /// the wire.
     pub fn body(&self, pose: Pose) -> Result<BodySpec, Error> {
         self.validate()?;
         let total = self.length();

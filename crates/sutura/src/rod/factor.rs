@@ -427,8 +427,8 @@ impl System {
         }
     }
 
-    /// Solves for six right sides at once, of a rod without multipliers: the nodes wait for one another, the right sides
-    /// do not. `z` has the nodes of the rod, of which all but those of `loaded` are zero.
+    /// Solves for six right sides at once, of a rod without multipliers: the nodes wait for one another, the right
+    /// sides do not. `z` has the nodes of the rod, of which all but those of `loaded` are zero.
     pub fn solve_six(&self, blocks: &Range<usize>, zone: &Range<usize>, z: &mut [Six], loaded: Range<usize>) {
         let base = 2 * blocks.start;
         let (lo, hi) = (2 * zone.start - base, 2 * zone.end - base);

@@ -1,8 +1,8 @@
 //! Contact of bodies with each other and with other shapes: hard, with Coulomb friction, in the small contact problem.
 //!
 //! A pair of solids touches at a few places, which are found anew at each iterate; a place that is near one of the
-//! iterate before takes over its force. Slip is that of the surfaces past the place, counted along the arc, so that what
-//! rolls does not slip.
+//! iterate before takes over its force. Slip is that of the surfaces past the place, counted along the arc, so that
+//! what rolls does not slip.
 
 use crate::collide::Candidates;
 use crate::math::{Pose, log};

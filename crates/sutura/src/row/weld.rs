@@ -208,8 +208,8 @@ impl Welds {
             .fold(0.0, |a, b| if b <= a { a } else { b })
     }
 
-    /// Turns the cross-sections by their part of the step (their particles are moved with the others), and puts those on
-    /// bodies where these are now.
+    /// Turns the cross-sections by their part of the step (their particles are moved with the others), and puts those
+    /// on bodies where these are now.
     pub fn apply(&self, model: &Model, state: &mut State, first: usize, border: &Border, scale: f64) {
         for w in &self.welds {
             match w.at {

@@ -435,15 +435,6 @@ impl System {
         let end = 2 * blocks.end - base;
         let pivot = |k: usize| &self.pivots[base + k];
         let (next, after) = (|k: usize| &self.next[base + k], |k: usize| &self.after[base + k]);
-        for k in loaded.start.min(lo)..lo {
-            let (p, n, a) = (pivot(k), next(k), after(k));
-            for c in 0..6 {
-                let s = p.lower(z[k][c]) * p.inv;
-                z[k][c] = s;
-                z[k + 1][c] -= t_vec(n, s);
-                z[k + 2][c] -= t_vec(a, s);
-            }
-        }
         for k in (hi..loaded.end.max(hi)).rev() {
             let (p, n, a) = (pivot(k), next(k - 1), after(k - 2));
             for c in 0..6 {
@@ -453,7 +444,7 @@ impl System {
                 z[k - 2][c] -= t_vec(a, s);
             }
         }
-        for k in lo..hi - 2 {
+        for k in loaded.start.min(lo)..hi - 2 {
             let (p, n, a) = (pivot(k), next(k), after(k));
             for c in 0..6 {
                 let s = p.lower(z[k][c]) * p.inv;

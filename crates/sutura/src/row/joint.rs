@@ -18,19 +18,19 @@
 //! the small contact problem.
 
 use crate::handle::Slots;
-use crate::math::{max_or_nan, outer};
+use crate::math::max_or_nan;
 use crate::model::Model;
 use crate::model::body::BodyModel;
 use crate::model::joint::{Along, JointModel, Meeting, Motor};
 use crate::motion::Motion;
 use crate::params;
 use crate::row::border::Border;
-use crate::row::movers::{Movers, momentum};
+use crate::row::movers::{Movers, momentum, turning_stiffness};
 use crate::row::side::{Moves, Side};
 use crate::row::system::{Entry, Source};
 use crate::state::{BodyState, State, places_of, root_of};
 use core::ops::Range;
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 /// Diagonal of a multiplier in its own scale: tells redundant multipliers apart. The residual does not have it, so what
 /// is held is held exactly.
@@ -223,7 +223,7 @@ impl Joints {
                 let Some(first) = a.first[side] else { continue };
                 let arm = meeting.frames[1].position - meeting.centers[side];
                 let firm = |axis: DVec3| inertia_about(model, state, motion, joint.bodies[side], axis);
-                let stiffness = turning_stiffness(force * sign, arm, firm);
+                let stiffness = turning_stiffness(force * sign, arm, |axis| WEAKENED * firm(axis));
                 for i in 0..3 {
                     (0..3).for_each(|j| border.add_own(first + 3 + i, first + 3 + j, stiffness.col(j)[i]));
                 }
@@ -385,24 +385,4 @@ fn rates(model: &Model, bodies: &Slots<BodyState>, motion: &Motion, slot: u32) -
     let momentum = momentum(body.mass.moments, start, now, motion.span);
     let velocity = start.kept + (now.position - start.target) / motion.span;
     [velocity, q * ((q.conjugate() * momentum) / body.mass.moments)]
-}
-
-/// Stiffness against turning of a force that stays as it is and acts at the end of an arm: the symmetric part of
-/// `(f . r) 1 - f r^T`. Its axes are the normal of the plane of both, the bisector and what is across these. Where it
-/// is negative it takes a part of what `firm` says that there is at most.
-fn turning_stiffness(force: DVec3, arm: DVec3, firm: impl Fn(DVec3) -> f64) -> DMat3 {
-    let size = force.length() * arm.length();
-    if !(size > 0.0 && size.is_finite()) {
-        return DMat3::ZERO;
-    }
-    let (f, r) = (force.normalize(), arm.normalize());
-    let cos = f.dot(r);
-    let bisector = (f + r).try_normalize().unwrap_or_else(|| r.any_orthonormal_vector());
-    let normal = f.cross(r).try_normalize().unwrap_or_else(|| bisector.any_orthonormal_vector());
-    let axes = [
-        (normal, size * cos),
-        (bisector, 0.5 * size * (cos - 1.0)),
-        (bisector.cross(normal), 0.5 * size * (cos + 1.0)),
-    ];
-    axes.map(|(axis, k)| outer(axis, axis) * k.max(-WEAKENED * firm(axis))).into_iter().sum()
 }

@@ -13,7 +13,7 @@
 //! The matrix has R_m I R_m^T / h^2, which leaves out a part of the order h |Omega|. In the methods with two solves
 //! Omega is the velocity at the end of a solve, and R_m the orientation there.
 
-use crate::math::{exp, log, skew};
+use crate::math::{exp, log, outer, skew};
 use crate::model::Model;
 use crate::model::shape::ShapeMotion;
 use crate::motion::{BodyStart, Motion};
@@ -107,6 +107,26 @@ pub(crate) fn follow_holder(model: &Model, state: &mut State, slot: u32) {
 pub(crate) fn six_columns(arm: DVec3) -> [DVec3; 6] {
     let turns = -skew(arm);
     [DVec3::X, DVec3::Y, DVec3::Z, turns.col(0), turns.col(1), turns.col(2)]
+}
+
+/// Stiffness against turning of a force that stays as it is and acts at the end of an arm: the symmetric part of
+/// `(f . r) 1 - f r^T`. Its axes are the normal of the plane of both, the bisector and what is across these. Where it
+/// is negative it takes off an axis what `most` allows.
+pub(crate) fn turning_stiffness(force: DVec3, arm: DVec3, most: impl Fn(DVec3) -> f64) -> DMat3 {
+    let size = force.length() * arm.length();
+    if !(size > 0.0 && size.is_finite()) {
+        return DMat3::ZERO;
+    }
+    let (f, r) = (force.normalize(), arm.normalize());
+    let cos = f.dot(r);
+    let bisector = (f + r).try_normalize().unwrap_or_else(|| r.any_orthonormal_vector());
+    let normal = f.cross(r).try_normalize().unwrap_or_else(|| bisector.any_orthonormal_vector());
+    let axes = [
+        (normal, size * cos),
+        (bisector, 0.5 * size * (cos - 1.0)),
+        (bisector.cross(normal), 0.5 * size * (cos + 1.0)),
+    ];
+    axes.map(|(axis, k)| outer(axis, axis) * k.max(-most(axis))).into_iter().sum()
 }
 
 /// Last steps of three unknowns.

@@ -6,7 +6,7 @@
 //! The cross-section has no inertia; each frame beside it is tied to it by half a joint, as to a clamp, so that two
 //! ends welded are one thread to second order in the element length.
 
-use crate::math::{exp, outer, skew};
+use crate::math::{exp, skew};
 use crate::model::Model;
 use crate::model::weld::Anchor;
 use crate::rod::assemble::clamp_terms;
@@ -15,7 +15,7 @@ use crate::rod::half_angle;
 use crate::rod::scratch::RodScratch;
 use crate::row::Rows;
 use crate::row::border::Border;
-use crate::row::movers::{Movers, six_columns};
+use crate::row::movers::{Movers, six_columns, turning_stiffness};
 use crate::state::State;
 use core::ops::Range;
 use glam::{DMat3, DQuat, DVec3};
@@ -278,20 +278,6 @@ fn go_with_body(model: &Model, state: &mut State, slot: u32, anchor: &Anchor) {
     state.weld_orientation[slot as usize] = pose.orientation;
 }
 
-/// Stiffness against turning of a force that acts at the end of an arm and keeps its direction: `(a . f) I - (a f^T + f
-/// a^T) / 2`, or of that what is positive.
-fn of_arm(arm: DVec3, force: DVec3, exact: bool) -> DMat3 {
-    let along = arm.dot(force);
-    if exact {
-        return DMat3::IDENTITY * along - (outer(arm, force) + outer(force, arm)) * 0.5;
-    }
-    // Eigenvectors: across both, and between them; along the sum of their directions it is negative.
-    let (Some(a), Some(f)) = (arm.try_normalize(), force.try_normalize()) else { return DMat3::ZERO };
-    let across = a.cross(f).try_normalize().unwrap_or_else(|| a.any_orthonormal_vector());
-    let between = (a - f).try_normalize().filter(|_| a.dot(f) < 0.99).unwrap_or_else(|| across.cross(a));
-    outer(across, across) * along.max(0.0) + outer(between, between) * (0.5 * (along + arm.length() * force.length()))
-}
-
 fn vector(border: &Border, k: usize) -> DVec3 {
     DVec3::new(border.step(k), border.step(k + 1), border.step(k + 2))
 }
@@ -373,7 +359,10 @@ pub(crate) fn gather(model: &Model, state: &State, rods: &mut RodScratch, rows: 
                 hold(border, place, &weld.place.projector());
                 hold(border, turning, &weld.turning.projector());
             }
-            Carrier::Body(_) => stiffness += of_arm(weld.unknowns.arm, weld.force, exact),
+            Carrier::Body(_) => {
+                let most = if exact { f64::INFINITY } else { 0.0 };
+                stiffness += turning_stiffness(weld.force, weld.unknowns.arm, |_| most);
+            }
         }
         add_block(border, turning, turning, &stiffness);
         turning.iter().for_each(|(j, v)| border.push(*j, v.dot(moment)));

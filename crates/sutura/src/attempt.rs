@@ -76,7 +76,9 @@ pub(crate) fn attempt(step: &mut Step<'_, '_>, sub: Substep, method: Method) -> 
             reel::release(model, state, &solver.rods.brakes);
             complete(model, state, solver, &stage, sub.h);
             let clear = [clearance.thread, clearance.shape].into_iter().flatten().all(f64::is_finite);
-            if clear && all_finite(model, state) { Ok(clearance) } else { Err(Rejection::NotFinite.into()) }
+            // The last solve is looked at once more when velocities are corrected.
+            let sound = all_finite(model, state) && (stage.last || in_proportion(model, state));
+            if clear && sound { Ok(clearance) } else { Err(Rejection::NotFinite.into()) }
         });
         let touches = verdict.is_ok() && method != Method::Euler && touches_anew(origin, state);
         let mut so_far = match (attempt, verdict) {
@@ -106,7 +108,6 @@ pub(crate) fn attempt(step: &mut Step<'_, '_>, sub: Substep, method: Method) -> 
                 Settled::Gained if !last => so_far.verdict = Err(Rejection::EnergyGained.into()),
                 Settled::Gained => {}
             }
-            // What was corrected of velocities may be out of all proportion.
             if so_far.verdict.is_ok() && !in_proportion(model, state) {
                 so_far.verdict = Err(Rejection::NotFinite.into());
             }

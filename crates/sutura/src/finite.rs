@@ -7,8 +7,8 @@ use crate::state::State;
 use glam::DVec3;
 use wide::f64x2;
 
-/// Whether everything that can be read of an accepted state is a finite number: also what is the sum or product of
-/// finite ones.
+/// Whether what can be read of an accepted state is finite, but for what [`in_proportion`] looks at: also what is the
+/// sum or product of finite numbers.
 pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
     let grips =
         state.grips.iter().all(|(_, g)| g.force.is_finite() && g.torque.is_finite() && g.pose.position.is_finite());
@@ -36,7 +36,7 @@ pub(crate) fn all_finite(model: &Model, state: &State) -> bool {
         j.force.is_finite() && j.torque.is_finite() && along.iter().all(|v| v.is_finite())
     });
     let between = state.contacts.bodies().iter().all(|c| c.force().is_finite());
-    grips && bodies && joints && between && shapes && threads && on_shapes.is_finite() && in_proportion(model, state)
+    grips && bodies && joints && between && shapes && threads && on_shapes.is_finite()
 }
 
 /// Whether the energy of every rod and body is a finite number, and so all that is worked out from its state. (Elastic

@@ -10,7 +10,7 @@ mod number;
 mod sweep;
 
 use crate::drive::{Interval, grip_pose, move_shapes, outside_forces};
-use crate::finite::all_finite;
+use crate::finite::{all_finite, in_proportion};
 use crate::math::Pose;
 use crate::model::Model;
 use crate::model::grip::{Drive, Hold};
@@ -180,7 +180,7 @@ fn substep(
         project(model, state, work, p);
     }
     leave_rates(model, state, &work.motion, h);
-    all_finite(model, state)
+    all_finite(model, state) && in_proportion(model, state)
 }
 
 /// Explicit Euler under outside forces and torques.

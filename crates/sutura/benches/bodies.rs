@@ -1,9 +1,14 @@
-//! Cost of free bodies at rest and in a heap: `cargo bench -p sutura --bench bodies [-- COUNT ...]`. Milliseconds of
-//! CPU time a frame: median and worst, of boxes apart from each other on a floor and of solids dropped into a box.
+//! Cost of bodies: `cargo bench -p sutura --bench bodies [-- COUNT ...]`. Milliseconds of CPU time per frame, median and
+//! worst: of boxes apart from each other on a floor, of solids dropped into a box, of a thread of 120 elements with a
+//! point mass, with a needle of that mass and with one that is driven, of beads on a thread, and of jaws that close on
+//! a wire with forces in newtons.
 
 use cpu_time::ThreadTime;
 use sutura::glam::{DQuat, DVec3};
-use sutura::{BodySpec, Friction, Geometry, Pose, Settings, ShapeSpec, World};
+use sutura::{
+    BodyMotion, BodySpec, Friction, Geometry, GripSpec, Handle, Hold, InstrumentSpec, LoadKind, LoadSpec, Material,
+    NeedleSpec, Place, Pose, Rod, RodSpec, Settings, ShapeSpec, WeldRest, WeldSpec, World,
+};
 
 fn world() -> World {
     let friction = Friction { stick: 0.4, slide: 0.4 };
@@ -44,6 +49,62 @@ fn heap(count: u32) -> World {
     world
 }
 
+/// A thread that hangs from a clamp and swings, with what `add` puts at its end.
+fn hanging(add: impl Fn(&mut World, Handle<Rod>, DVec3)) -> World {
+    let mut world = World::new(Settings::default()).expect("valid settings");
+    let down = DVec3::new(0.3, 0.0, -1.0).normalize();
+    let end = down * 0.12;
+    let thread = RodSpec::straight(DVec3::ZERO, end, 120, 1.1e-4, Material::elastic(2e9, 1150.0));
+    let rod = world.insert_rod(&thread).expect("a thread");
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Pin)).expect("a grip");
+    add(&mut world, rod, end);
+    world
+}
+
+fn with_mass(world: &mut World, rod: Handle<Rod>, _: DVec3) {
+    let kind = LoadKind::Mass { place: Place::End, mass: 66e-6, inertia: DVec3::ZERO };
+    world.insert_load(&LoadSpec { rod, kind }).expect("a load");
+}
+
+fn with_needle(motion: BodyMotion) -> impl Fn(&mut World, Handle<Rod>, DVec3) {
+    move |world, rod, end| {
+        let needle = NeedleSpec::preset("SH").expect("a needle of the catalogue");
+        let body = needle.body(needle.pose(end, end, DVec3::X)).expect("a needle");
+        let body = world.insert_body(&body).expect("a body");
+        world.set_body_motion(body, motion).expect("a body of this world");
+        world.insert_weld(&WeldSpec::to_body((rod, Place::End), body, DVec3::ZERO)).expect("a swage");
+    }
+}
+
+/// Beads that a thread runs through, evenly along it.
+fn with_beads(count: u32) -> impl Fn(&mut World, Handle<Rod>, DVec3) {
+    move |world, rod, _| {
+        for k in 0..count {
+            let particle = 120 * (k + 1) / (count + 1);
+            let at = world.rod(rod).expect("a thread of this world").positions()[particle as usize];
+            let bead = BodySpec::solid(Geometry::Sphere { radius: 4e-4 }, 2500.0, Pose::at(at));
+            let body = world.insert_body(&bead).expect("a bead");
+            let weld = WeldSpec::to_body((rod, Place::Particle(particle)), body, DVec3::ZERO);
+            world.insert_weld(&WeldSpec { rest: WeldRest::Loose, ..weld }).expect("a bead on its thread");
+        }
+    }
+}
+
+/// Jaws that are about to close on a wire.
+fn jaws(force: u32) -> World {
+    let friction = Friction { stick: 0.3, slide: 0.3 };
+    let settings = Settings { gravity: DVec3::ZERO, friction, ..Settings::default() };
+    let mut world = World::new(settings).expect("valid settings");
+    let driver = InstrumentSpec::needle_driver(Pose::IDENTITY);
+    let spec = InstrumentSpec { opening: 0.2, closing_force: f64::from(force), ..driver };
+    let tool = world.insert_instrument(&spec).expect("an instrument");
+    let wire = Geometry::Capsule { radius: 3e-4, half_length: 6e-3 };
+    let at = Pose::new(DVec3::new(3e-4, 0.0, 5e-3), DQuat::from_rotation_arc(DVec3::Z, DVec3::Y));
+    world.insert_body(&BodySpec::solid(wire, 7900.0, at)).expect("a wire");
+    world.close_jaws(&tool, &spec, true).expect("an instrument of this world");
+    world
+}
+
 fn measure(name: &str, count: u32, mut world: World, frames: usize) {
     let mut ms: Vec<f64> = (0..frames)
         .map(|_| {
@@ -66,5 +127,15 @@ fn main() {
     }
     for count in of(&[5, 10]) {
         measure("heap", count, heap(count), 120);
+    }
+    measure("mass", 1, hanging(with_mass), 120);
+    measure("needle", 1, hanging(with_needle(BodyMotion::Free)), 120);
+    measure("driven", 1, hanging(with_needle(BodyMotion::Driven)), 120);
+    for count in of(&[1, 2, 4, 8, 16]) {
+        measure("beads", count, hanging(with_beads(count)), 60);
+    }
+    println!("{:>8} {:>7}", "", "newtons");
+    for force in [1, 10, 100] {
+        measure("jaws", force, jaws(force), 60);
     }
 }

@@ -190,6 +190,32 @@ fn a_held_body_and_its_holder_are_one() {
     assert!(off.length() < 1e-3 && turn < 0.15, "{off} {turn}");
 }
 
+/// Beads sit in the middle of a thread that runs through them: it is as long as without them, and bears them all.
+#[test]
+fn beads_hang_on_the_thread_that_runs_through_them() {
+    let settings = Settings { linear_drag: 20.0, angular_drag: 20.0, ..Settings::default() };
+    let mut world = World::new(settings).unwrap();
+    let rod = world.insert_rod(&thread(DVec3::ZERO, DVec3::NEG_Z * 0.12, 120)).unwrap();
+    world.insert_grip(&GripSpec::at_once(rod, Place::Start, Hold::Clamp)).unwrap();
+    let mut weight = 0.0;
+    for particle in [20, 45, 46, 100] {
+        let at = world.rod(rod).unwrap().positions()[particle];
+        // The place is the very middle of the bead, and within an element's reach of the next.
+        let bead = BodySpec::solid(Geometry::Sphere { radius: 4e-4 }, 2500.0, Pose::at(at));
+        let body = world.insert_body(&bead).unwrap();
+        let weld = WeldSpec::to_body((rod, Place::Particle(particle as u32)), body, DVec3::ZERO);
+        world.insert_weld(&WeldSpec { rest: WeldRest::Loose, ..weld }).unwrap();
+        weight += world.body(body).unwrap().mass().mass * G;
+    }
+    step(&mut world, 480);
+    let rod = world.rod(rod).unwrap();
+    let own: f64 = (0..120).map(|e| rod.mass_per_length(e) * rod.rest_lengths()[e]).sum::<f64>() * G;
+    let top = rod.internal_force(0).z;
+    let wanted = weight + own * (1.0 - 0.5 / 120.0);
+    assert!((top / wanted - 1.0).abs() < 1e-3, "{top} {wanted}");
+    assert!(rod.positions().iter().all(|x| x.x.abs() < 1e-6 && x.y.abs() < 1e-6));
+}
+
 /// A thread's bits are the same whoever restores what; a body that goes lets go.
 #[test]
 fn attachments_are_saved_and_come_apart_with_their_body() {

@@ -189,6 +189,10 @@ impl Collider {
         };
         let off = local - from_parry(on.point);
         let length = off.length();
+        // The very middle of a ball has no nearest point: one beside it has.
+        if length.is_nan() && local == DVec3::ZERO {
+            return self.distance_local(DVec3::Z * (BESIDE * self.half_side()));
+        }
         let sign = if sides && on.is_inside { -1.0 } else { 1.0 };
         // On the surface itself the direction is lost: away from the body's origin will do.
         let normal = if length > 0.0 { off * (sign / length) } else { local.normalize_or(DVec3::Z) };
@@ -276,7 +280,6 @@ impl Collider {
         let along = b - a;
         let side = |s: f64, d: Distance| (s, d, d.normal.dot(along));
         let (mut lo, mut hi) = (side(0.0, known[0]), side(1.0, known[1]));
-        // NaN, in the very middle of a ball, is no direction either.
         if !(lo.2 < 0.0 && hi.2 > 0.0) {
             return None;
         }
@@ -351,6 +354,9 @@ impl Collider {
         (lo.min(lo2) - bulge, hi.max(hi2) + bulge)
     }
 }
+
+/// How far beside the middle of a ball that is, over its radius.
+const BESIDE: f64 = 1e-9;
 
 /// Part of a distance by which rounding may bring a convex surface nearer than its tangent.
 const CONVEX: f64 = 1e-9;
